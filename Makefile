@@ -7,13 +7,13 @@ UV ?= uv
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 INSTALLING := .venv/.installing
-# JupyterLab asks for this word where the only user is root, as in containers.
+# JupyterLab needs this option if the user is root, as in containers.
 AS_ROOT := $(if $(filter 0,$(shell id -u)),--allow-root)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_NO_INPUT := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup system report test wheel-check test-lowest lab doctor lint coverage mutants lock clean
+.PHONY: help setup system report test wheel-check test-lowest lab doctor lint coverage mutants lock release clean
 
 help:
 	@echo "make report [PROFILE=full]        run the study and build the report; quick, deep"
@@ -23,10 +23,11 @@ help:
 	@echo "make lab                          open the notebooks in JupyterLab"
 	@echo "make doctor                       check the installation, line by line"
 	@echo "make lint                         check style, types, imports and spelling"
-	@echo "make coverage                     run the tests, and tell what they do not reach"
-	@echo "make mutants                      change the code at random: do the tests notice?"
-	@echo "make lock                         pin the environment anew (needs uv)"
-	@echo "make clean                        remove what was built, but no download"
+	@echo "make coverage                     run the tests, and list the lines they do not reach"
+	@echo "make mutants                      change the code at random: do the tests fail?"
+	@echo "make lock                         pin the environment again (needs uv)"
+	@echo "make release VERSION=1.0.0        tag a version, with its report, wheel and checksums"
+	@echo "make clean                        remove build results, but no downloads"
 
 report: setup
 	@$(BIN)/hicp report --profile $(PROFILE)
@@ -46,7 +47,7 @@ lab: setup
 doctor: $(INSTALLED)
 	@$(BIN)/hicp doctor
 
-# All that .pre-commit-config.yaml names, from the locked environment: no network.
+# Everything in .pre-commit-config.yaml, from the locked environment, without network.
 lint: $(INSTALLED)
 	@$(BIN)/pre-commit run --all-files
 
@@ -57,15 +58,15 @@ coverage: setup
 mutants: setup
 	@$(BIN)/python tools/mutate.py $(MUTANTS_ARGS)
 
-# Without a network what is committed still runs, and the report says what it lacks.
+# Without a network, everything that is committed still runs, and the report says what is missing.
 setup: $(INSTALLED) system
 	@$(BIN)/hicp models fetch || echo "make: going on without MediaPipe's weights" >&2
 
 # The locked environment. mediapipe's wheel declares two packages that the study leaves out
-# (see pyproject.toml), hence --no-deps: the lock is complete by itself.
-# Editable the plain way: else every start of Python imports a finder for the package data.
-# Where Python may not write bytecode (PYTHONDONTWRITEBYTECODE), every process would compile all it imports anew.
-# A marker tells an installation that was cut off: it is made anew.
+# (see pyproject.toml), hence --no-deps: the lock is complete.
+# editable_mode=compat: otherwise every start of Python imports a finder for the package data.
+# Where Python may not write bytecode (PYTHONDONTWRITEBYTECODE), every process would compile all its imports again.
+# A marker file identifies an interrupted installation, which is then repeated.
 $(INSTALLED): environment.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' || \
 	  { echo "make: $(PYTHON) is not Python 3.11-3.14; name one that is: make PYTHON=python3.12" >&2; exit 1; }
@@ -85,7 +86,7 @@ $(INSTALLED): environment.lock pyproject.toml
 	@ln -sfn $(CURDIR)/tools/jupyter/* .venv/etc/jupyter/
 	@rm $(INSTALLING) && touch $(INSTALLED)
 
-# Libraries that the wheels load and do not bring: installed where that is allowed.
+# System libraries that the wheels load but do not contain: installed if permitted.
 system: $(INSTALLED)
 	@packages="$$($(BIN)/python -m hicp_lib.cli.system_libraries)"; \
 	if [ -z "$$packages" ]; then exit 0; fi; \
@@ -102,6 +103,10 @@ lock:
 	@$(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-annotate \
 	  --extra all --group mediapipe --group test --group lint --group build --custom-compile-command "make lock" \
 	  --output-file environment.lock pyproject.toml
+
+# RELEASE_ARGS=--dry-run says what it would do
+release: setup
+	@$(BIN)/python tools/release.py $(or $(VERSION),$(error name the version: make release VERSION=1.0.0)) $(RELEASE_ARGS)
 
 clean:
 	@rm -rf _build results

@@ -1,4 +1,4 @@
-"""`hicp calibration`: keypoint scores that mean the same whoever gave them."""
+"""`hicp calibration`: keypoint scores that are comparable between detectors."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from hicp_lib.cli.options import PATH
 
 @click.group()
 def calibration() -> None:
-    """Keypoint scores that say how often they are right."""
+    """Convert keypoint scores to expected hit rates."""
 
 
 @calibration.command("fit")
@@ -18,7 +18,7 @@ def calibration() -> None:
 @click.option("--detector", default="detector", show_default=True, help="Name kept in the file.")
 @click.option("--out", type=PATH, required=True, help="CSV file to write.")
 def calibration_fit(annotations: Path, detections: Path, detector: str, out: Path) -> None:
-    """Fit hit rates to scores, on images that nothing is evaluated on later."""
+    """Fit hit rates to scores, on images not used for evaluation later."""
     from hicp_lib.evaluation.calibration.files import fit_calibrations, write_calibrations
     from hicp_lib.formats.annotations import read_annotations, read_detections
 
@@ -30,11 +30,11 @@ def calibration_fit(annotations: Path, detections: Path, detector: str, out: Pat
 
 @calibration.command("apply")
 @click.option("--calibrations", type=PATH, required=True, help="Of `fit`, or the report's Parquet file.")
-@click.option("--detector", default="", help="Whose; needed where the file has several detectors'.")
+@click.option("--detector", default="", help="Detector; needed if the file has several.")
 @click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
-@click.option("--out", type=PATH, required=True, help="Results to write, scores as they were beside.")
+@click.option("--out", type=PATH, required=True, help="Results to write; keeps the original scores too.")
 def calibration_apply(calibrations: Path, detector: str, detections: Path, out: Path) -> None:
-    """Write results with calibrated keypoint scores; the scores as they were stay beside them."""
+    """Write results with calibrated keypoint scores; the original scores are kept too."""
     from hicp_lib.evaluation.calibration.files import apply_calibrations, read_calibrations
 
     n = apply_calibrations(detections, read_calibrations(calibrations, detector), out)

@@ -1,4 +1,4 @@
-"""`hicp doctor`: what the study needs from this machine, found or missing, and how to mend it."""
+"""`hicp doctor`: check what the study needs from this machine, with a remedy for each failure."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ PYTHONS = ((3, 11), (3, 14))
 MIN_FREE_GB = 3.0
 PROBE_LIMIT_S = 120.0
 OK, ABSENT, FAIL = "ok", "--", "FAIL"
-"""What a check came to; absent is a part that was not installed, which is no fault."""
+"""Result of a check; absent is a part that was not installed, which is not a failure."""
 PROBE = (sys.executable, "-m", "hicp_lib.cli.probes")
 _LOCKED = "locked environment"
 _OPENCV = "opencv-python-headless"
@@ -46,13 +46,13 @@ class Check:
     Attributes
     ----------
     name : str
-        What was looked at.
+        What was checked.
     status : str
         `OK`, `ABSENT` or `FAIL`.
     finding : str
         What was found.
     remedy : str
-        What to do about it; told where it failed.
+        What to do about it; shown if it failed.
 
     Examples
     --------
@@ -67,7 +67,7 @@ class Check:
 
     @classmethod
     def of(cls, name: str, is_ok: bool, finding: str, remedy: str) -> Check:
-        """A check that is well or not.
+        """A check that passed or failed.
 
         Parameters
         ----------
@@ -83,14 +83,14 @@ class Check:
 
 
 def run_checks() -> list[Check]:
-    """Every check; none of them raises, and none contacts a network."""
+    """All checks; none raises, and none uses the network."""
     checks: list[Callable[[], Check | list[Check]]] = [check_python, check_system_libraries]
     checks += [check_locked_versions, check_opencv, check_weights, check_probes, check_folders]
     return [line for check in checks for line in _lines(check)]
 
 
 def _lines(check: Callable[[], Check | list[Check]]) -> list[Check]:
-    """What a check found; that it could not look is a finding, too."""
+    """The findings of a check; an exception is a finding, too."""
     try:
         found = check()
     except Exception as error:  # a broken installation may raise anything
@@ -103,19 +103,19 @@ def check_python() -> Check:
     """The version, and that it runs in an environment of its own."""
     oldest, newest = PYTHONS
     is_ok = oldest <= sys.version_info[:2] <= newest
-    remedy = "make it anew with a Python from 3.11 to 3.14: rm -r .venv; make report PYTHON=python3.12"
+    remedy = "make it again with a Python from 3.11 to 3.14: rm -r .venv; make report PYTHON=python3.12"
     return Check.of("Python", is_ok, platform.python_version(), remedy)
 
 
 def check_system_libraries() -> Check:
-    """What the wheels load and do not bring."""
+    """System libraries that the wheels load but do not contain."""
     missing = missing_packages()
     finding = f"missing: {' '.join(missing)}" if missing else "all that is needed"
     return Check.of("system libraries", not missing, finding, f"sudo apt-get install {' '.join(missing)}")
 
 
 def check_locked_versions(lock_path: Path = provenance.LOCK_PATH) -> Check:
-    """That what is installed is what the lock says."""
+    """Whether the installed versions are those of the lock file."""
     if provenance.CHECKOUT is None:
         return Check(_LOCKED, OK, "none: hicp was installed without a checkout")
     try:
@@ -153,21 +153,21 @@ def _installed(name: str) -> str:
 
 
 def check_probes() -> list[Check]:
-    """That detectors, renderer and controller run: as many trials at a time as there are processors."""
+    """Whether detectors, renderer and controller run: one trial per processor at a time."""
     jobs = [(name, partial(check_probe, name)) for name in probes()]
     done = dict(run_jobs(jobs, usable_cores(), "threads"))
     return [done[name] for name, _ in jobs]
 
 
 def check_probe(name: str, command: tuple[str, ...] = PROBE, limit_s: float = PROBE_LIMIT_S) -> Check:
-    """Run one trial (see `hicp_lib.cli.probes`) in a process of its own, which may die or hang.
+    """Run one trial (see `hicp_lib.cli.probes`) in a separate process, which may crash or hang.
 
     Parameters
     ----------
     name : str
         Of the trial.
     command : tuple of str
-        What runs the trial; its name is appended.
+        The command of the trial; its name is appended.
     limit_s : float
         After this the trial and all its processes are ended.
     """
@@ -181,14 +181,14 @@ def check_probe(name: str, command: tuple[str, ...] = PROBE, limit_s: float = PR
         except subprocess.TimeoutExpired:
             return Check(name, FAIL, f"no answer within {limit_s:g} s, ended", _remedy(""))
         finally:
-            with contextlib.suppress(ProcessLookupError):  # itself, and what it started
+            with contextlib.suppress(ProcessLookupError):  # itself and its children
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
     return _outcome(name, process.returncode, _last_line(output), _last_line(errors))
 
 
 def _outcome(name: str, code: int, output: str, errors: str) -> Check:
-    """What the end of a trial means; `output` and `errors` are its last words on the two outputs."""
+    """The result of a finished trial; `output` and `errors` are the last lines on its two outputs."""
     if code in (0, EXIT_ABSENT):
         return Check(name, ABSENT if code else OK, output)
     if code == EXIT_FAILED and output:
@@ -199,7 +199,7 @@ def _outcome(name: str, code: int, output: str, errors: str) -> Check:
 
 
 def _remedy(words: str) -> str:
-    """What to do about a failure, by what it says: a shared library's package, or to install anew."""
+    """Remedy of a failure, by its message: the package of a shared library, or a new installation."""
     library = re.search(r"lib[\w+.-]+\.so[.\d]*(?=: cannot open shared object)", words)
     if library is None:
         return f"in a container or chroot, give it /proc, /sys and /dev; else: {_REINSTALL}"
@@ -213,17 +213,17 @@ def _last_line(text: str) -> str:
 
 
 def check_opencv() -> Check:
-    """That no other distribution has laid its OpenCV over the one without a display."""
+    """Whether another distribution has overwritten the headless OpenCV."""
     others = " ".join(name for name in _OTHER_OPENCVS if _installed(name) != "none")
     version = _installed(_OPENCV)
     uninstall = f"pip uninstall -y {others}; " if others else ""
     remedy = f"{uninstall}pip install --force-reinstall --no-deps {_OPENCV}"
-    finding = f"{others} in the place of {_OPENCV}" if others else f"{_OPENCV} {version}"
+    finding = f"{others} instead of {_OPENCV}" if others else f"{_OPENCV} {version}"
     return Check.of("OpenCV", not others and version != "none", finding, remedy)
 
 
 def check_weights() -> Check:
-    """That every weight file is here and is the one the registry names."""
+    """Whether every weight file is present and matches the registry's hash."""
     from hicp_lib.detectors.weights.default import registry, status
 
     try:
@@ -231,26 +231,26 @@ def check_weights() -> Check:
     except InputError as error:
         return Check("weights", FAIL, str(error), "git restore data/detectors.json")
     wrong = ", ".join(f"{name} {state}" for name, state in found.items() if state != "present")
-    return Check.of("weights", not wrong, wrong or f"{len(found)} present and sound", "hicp models fetch")
+    return Check.of("weights", not wrong, wrong or f"{len(found)} present and intact", "hicp models fetch")
 
 
 def check_folders() -> list[Check]:
-    """The folders that are written to."""
+    """The output folders."""
     cache = check_folder("cache", cache_dir(), "set HICP_CACHE to a folder you may write to")
     return cache + check_folder("results", working_folder() / "results", "give yourself the right to do so")
 
 
 def check_folder(name: str, folder: Path, remedy: str) -> list[Check]:
-    """That files can be written in a folder, and that its disk has room.
+    """Whether files can be written in a folder, and its disk has space.
 
     Parameters
     ----------
     name : str
         What the folder is for.
     folder : Path
-        It need not exist: then the nearest one above counts.
+        If it does not exist, the nearest existing parent is checked.
     remedy : str
-        What to do where one may not write there.
+        What to do if it is not writable.
     """
     there = next(path for path in (folder, *folder.parents) if path.exists())
     is_writable = there.is_dir() and os.access(there, os.W_OK)

@@ -1,4 +1,4 @@
-"""`hicp inspect` and `hicp draw`: what files are, and what detections look like."""
+"""`hicp inspect` and `hicp draw`: identify files, and draw detections."""
 
 import json
 from dataclasses import asdict
@@ -29,7 +29,7 @@ def inspect_(path: Path, as_json: bool) -> int:
 @click.command()
 @click.option("--detections", type=PATH, required=True, help="What `hicp detect` or `hicp import` wrote.")
 @click.option("--images", type=PATH, required=True, help="Folder of the pictures.")
-@click.option("--annotations", type=PATH, help="The truth: drawn beside, and pictures sorted by it.")
+@click.option("--annotations", type=PATH, help="Annotations: drawn too, and used to sort.")
 @click.option("--out", type=PATH, required=True, help="An .html page, or a new folder for PNG files.")
 @click.option("--limit", default=100, show_default=True, type=click.IntRange(min=1),
               help="At most so many pictures, worst first.")  # fmt: skip

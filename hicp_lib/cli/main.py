@@ -1,6 +1,6 @@
 """The `hicp` command. Every subcommand only reads its arguments, calls the library and prints.
 
-Libraries are imported inside the commands, so that `hicp --help` answers at once.
+Libraries are imported inside the commands, so that `hicp --help` is fast.
 Exit codes: 0 done, 1 a notebook or the book failed, 2 bad input or usage; always with one line on
 standard error, never a traceback for a user's mistake.
 """
@@ -41,32 +41,32 @@ from hicp_lib.core.errors import InputError, one_line, printable
 _MOST_SHOWN = 1000  # characters of a message: a file may hold a name of megabytes
 _keypoint_map_option = click.option(
     "--keypoint-map", type=PATH, metavar="FILE.json",
-    help="What keypoint names of the annotations mean: their names to ours, or null to leave one out.",
+    help="Meaning of the annotations' keypoint names: theirs to ours, or null to leave one out.",
 )  # fmt: skip
 
 
 def main() -> NoReturn:
     """Run the command line and exit."""
-    # What is damaged is told in one line, by us: what libraries written in C say of it goes nowhere.
+    # Damaged input is reported in one line by us: discard the messages of C libraries.
     sys.stderr = os.fdopen(os.dup(2), "w", 1, sys.stderr.encoding, "backslashreplace")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     warnings.filterwarnings("ignore", module="PIL")
-    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))  # tidied up as at an error
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))  # cleaned up as after an error
     code = run(sys.argv[1:])
     try:
         sys.stdout.flush()
-    except OSError:  # whoever read it has gone, or the disk is full: nothing more can be told there
+    except OSError:  # the reader is gone, or the disk is full: nothing more can be written there
         sys.stdout, code = None, code or 2
     sys.exit(code)
 
 
 def run(arguments: list[str]) -> int:
-    """Run one command; its exit code. A user's mistake is told in one line on standard error.
+    """Run one command; its exit code. A user's mistake is reported in one line on standard error.
 
     Parameters
     ----------
     arguments : list of str
-        What follows `hicp` on the command line.
+        The arguments after `hicp` on the command line.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def run(arguments: list[str]) -> int:
 
 
 class _Shown:
-    """A stream that shows what a terminal would obey: names and messages come from outside."""
+    """A stream that escapes control characters, since names and messages may be external."""
 
     def __init__(self, stream: Any) -> None:
         self._stream = stream
@@ -107,7 +107,7 @@ def _run(arguments: list[str]) -> int:
         where = context.command_path if context else "hicp"
         return _fail(f"{' '.join(error.format_message().split())} See: {where} --help", 2)
     except (click.Abort, KeyboardInterrupt, SystemExit) as error:
-        return _fail("stopped; run the same command again to go on", getattr(error, "code", 130))
+        return _fail("stopped; run the same command again to continue", getattr(error, "code", 130))
     except InputError as error:
         return _fail(error, 2)
     except OSError as error:
@@ -115,11 +115,11 @@ def _run(arguments: list[str]) -> int:
         what = one_line(error) if name is None else f"{name}: {error.strerror}"
         return _fail(f"{what}; check the path, the rights and the disk space", 2)
     except MemoryError:
-        return _fail("the memory is not enough; give less at once, or fewer --workers", 2)
+        return _fail("the memory is not enough; process less at once, or use fewer --workers", 2)
 
 
 def _tell_notes(path: Path, notes: dict[str, str], area: str = "segment") -> None:
-    """Say what a reader of figures must know of a file; of areas, if they are used."""
+    """Print a file's notes; those on areas only if they are used."""
     for about, note in notes.items():
         if about != "area" or area == "segment":
             say(f"{path}: {note}")
@@ -170,9 +170,9 @@ def dataset() -> None:
 @_keypoint_map_option
 @click.option("--out", type=PATH, required=True, help="Where basic/ and headless/ are written.")
 @click.option("--min-pixels", default=20_000, show_default=True, type=click.IntRange(min=1))
-@click.option("--orientation", type=click.Choice(["stored", "seen"]), help="Where pictures are flagged.")
+@click.option("--orientation", type=click.Choice(["stored", "seen"]), help="If images are flagged.")
 def dataset_create(out: Path, annotations: Path, images: Path, **options) -> None:
-    """Cut people out of annotated images: Basic, and Headless without their heads."""
+    """Crop people from annotated images: Basic, and Headless without their heads."""
     from hicp_lib.datasets.subsets import create_hicp, notes
 
     counts = create_hicp(annotations, images, out, progress=sys.stderr.isatty(), **options)
@@ -188,7 +188,7 @@ def dataset_create(out: Path, annotations: Path, images: Path, **options) -> Non
 @click.option("--images", "images_dir", type=PATH, help="Folder of images without annotations, or a video.")
 @click.option("--out", type=PATH, required=True, help="To write: .json (COCO results), .csv or .parquet.")
 @click.option("--by-image", is_flag=True, help="Print a line per image: people, scores (keypoints of each).")
-@click.option("--strict", is_flag=True, help="End at a picture that cannot be read.")
+@click.option("--strict", is_flag=True, help="Stop at an image that cannot be read.")
 @worker_options("Threads")
 def detect(
     detector: str, dataset_dir: Path | None, images_dir: Path | None, out: Path, by_image: bool, strict: bool,
@@ -196,8 +196,8 @@ def detect(
 ) -> None:  # fmt: skip
     """Find people and their keypoints in images.
 
-    What was found in an image is kept: after an interruption, the same command does only the rest. A picture
-    that cannot be read is told and passed over; where none can be, the exit code is 2.
+    Results are cached: after an interruption, the same command does only the rest. An image that cannot be
+    read is reported and skipped; if none can be read, the exit code is 2.
     """
     from hicp_lib.detectors.registry import DETECTORS, describe, make_detector
     from hicp_lib.detectors.runtime.to_file import detect_to_file, open_dataset, open_pictures
@@ -208,7 +208,7 @@ def detect(
         raise click.UsageError("Give either --dataset DIR or --images DIR.", click.get_current_context())
     refuse_other_suffix(out)
     needs_model = detector in DETECTORS and DETECTORS[detector].needs_model
-    # Held until the end: the runs share the network it has open.
+    # Kept until the end: the runs share its open network.
     made = make_detector(detector, **given(**chosen)) if needs_model else None
     pictures = open_pictures(source) if dataset_dir is None else open_dataset(source)
     options = {"workers": workers, "strict": strict} | given(**chosen)
@@ -269,7 +269,7 @@ def export(detections: Path, kind: str, layout: str, annotations: Path | None, o
 @click.option("--sigmas", help="halpe or wholebody; else halpe, of each hand wholebody.")
 @click.option("--area", default="segment", show_default=True, help="Or box, box53 (0.53 x box), source.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the bootstrap.")
-@click.option("--by-image", is_flag=True, help="OKS of the people of each image, too; the worst first.")
+@click.option("--by-image", is_flag=True, help="Also the OKS of each image's people; worst first.")
 @click.option("--out", type=PATH, help="To write: .json, .csv or .parquet.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def evaluate(
@@ -278,8 +278,8 @@ def evaluate(
 ) -> None:  # fmt: skip
     """Average precision and recall by OKS, with 95 % bootstrap intervals over images.
 
-    Over all labelled keypoints, and over the visible ones only; with those outside the picture, by extended
-    OKS, where the annotations know of them; of hands, as one object and each by itself.
+    Over all labelled keypoints, and over the visible ones only; by extended OKS, if the annotations have
+    keypoints outside the picture; for hands, both as one object and each alone.
     """
     from hicp_lib.core.keypoints import GROUPS
     from hicp_lib.evaluation.ap import judgement
@@ -310,7 +310,7 @@ def evaluate(
 
 
 def _lacking(row: dict[str, Any]) -> str:
-    """Who gives nobody of a group, in words; empty where there are figures."""
+    """Which of annotations and detections lack a group, in words; empty if neither does."""
     if row["AP"] is not None:
         return ""
     who = "the detections give" if row["n_people"] else "the annotations give"
@@ -338,7 +338,7 @@ def _tell_evaluation(row: dict[str, Any]) -> None:
 @click.option("--profile", default="full", show_default=True, help="A profile of notebooks/profiles.toml.")
 @click.option("-p", "--parameter", "pairs", nargs=2, multiple=True, metavar="NAME VALUE",
               help="A notebook parameter; may be repeated.")  # fmt: skip
-@click.option("--only", metavar="NOTEBOOK", help="Run this one and those it needs; build no book.")
+@click.option("--only", metavar="NOTEBOOK", help="Run this notebook and those it needs; build no book.")
 @click.option("--results", "root", type=PATH,
               help="Where results/ and _build/ are written; the working folder if not given.")  # fmt: skip
 @click.option("--dask", metavar="ADDRESS", envvar="HICP_DASK",
@@ -346,7 +346,7 @@ def _tell_evaluation(row: dict[str, Any]) -> None:
 def report(
     profile: str, pairs: tuple[tuple[str, str], ...], only: str | None, root: Path | None, dask: str | None
 ) -> int:
-    """Run the notebooks and build the book; what has not changed is not done again."""
+    """Run the notebooks and build the book; unchanged parts are not run again."""
     from hicp_lib.core.checkout import sources, working_folder
     from hicp_lib.report.build import make_report
     from hicp_lib.report.run import RunError
@@ -354,7 +354,7 @@ def report(
     if dask is not None:
         from hicp_lib.core.cluster import connected
 
-        with connected(dask):  # what is amiss is told before any notebook runs
+        with connected(dask):  # fail before any notebook runs
             os.environ["HICP_DASK"] = dask  # where the notebooks' processes look
     try:
         make_report(profile, list(pairs), click.echo, sources(), root or working_folder(), only)

@@ -1,4 +1,4 @@
-"""`hicp models`: the detectors' weights, the study's and the user's own."""
+"""`hicp models`: the detectors' weights, those of the study and the user's own."""
 
 import click
 
@@ -14,7 +14,7 @@ def models() -> None:
 
 @models.command("list")
 def models_list() -> None:
-    """List the weight files, their licences, and whether they are here."""
+    """List the weight files, their licences, and whether they are present."""
     from hicp_lib.detectors.weights import default
     from hicp_lib.detectors.weights.published import published, status
     from hicp_lib.detectors.weights.user import all_user_options
@@ -28,7 +28,7 @@ def models_list() -> None:
         used_by = f"{model.use or 'not run here'}: {model.note}"
         rows.append((model.name, status(model), _mb(size), model.licence or "-", used_by))
     click.echo(text_table(rows))
-    click.echo("- is unknown, a size until the file is here; published models are fetched by name only")
+    click.echo("- is unknown, a size until the file is present; published models are fetched by name only")
     for name, options in all_user_options().items():
         click.echo(f"yours: {name} with {', '.join(f'{key} {value}' for key, value in options.items())}")
 
@@ -40,7 +40,7 @@ def _mb(size_bytes: int | None) -> str:
 @models.command("fetch")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 def models_fetch(names: tuple[str, ...]) -> None:
-    """Get the weight files that are not here, and check each against its hash.
+    """Fetch the missing weight files, and check each against its hash.
 
     NAME is a weight file, a detector, or a published model; without any, all weight files are fetched,
     and no published model. MediaPipe itself comes with its detectors' weights.
@@ -66,7 +66,7 @@ def models_fetch(names: tuple[str, ...]) -> None:
 @models.command("show")
 @detector_options
 def models_show(detector: str, **chosen) -> None:
-    """Tell everything that is taken for granted about a detector and its model file."""
+    """Print everything that is assumed about a detector and its model file."""
     from hicp_lib.detectors.registry import describe, make_detector
 
     rows = describe(make_detector(detector, **given(**chosen)))
@@ -76,7 +76,7 @@ def models_show(detector: str, **chosen) -> None:
 @models.command("use")
 @detector_options
 def models_use(detector: str, **chosen) -> None:
-    """Say once which model file a detector runs on; notebooks and commands then take it by its name."""
+    """Register a detector's model file once; notebooks and commands then use it by the detector's name."""
     from hicp_lib.detectors.registry import COMBINED, DETECTORS, describe, make_detector
     from hicp_lib.detectors.weights.user import keep_user_options
 

@@ -1,4 +1,4 @@
-"""Kinds of options that the `hicp` command's parts share."""
+"""Shared options of the `hicp` command's parts."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -15,7 +15,7 @@ _READ_OF_FOLDERS = ("annotations.json", "truth.parquet", "joints.parquet", "clic
 
 
 class _Path(click.Path):
-    """A path; what a command reads is not what it writes, its `out`."""
+    """A path; refuses an input that is also the output, `out`."""
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Path:
         path = Path(str(super().convert(value, param, ctx)))
@@ -31,10 +31,10 @@ PATH = _Path()
 
 
 class FiniteRange(click.FloatRange):
-    """Numbers of a range; click lets NaN pass, and infinity where there is no bound."""
+    """Numbers in a range; click accepts NaN, and infinity without a bound."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """As click's, of what is a finite number.
+        """As click's, for finite numbers only.
 
         Parameters
         ----------
@@ -52,17 +52,17 @@ class FiniteRange(click.FloatRange):
 
 people_option = click.option(
     "--people", default="held-out", show_default=True, type=click.Choice(["development", "held-out"]),
-    help="What is tuned is tuned on people for development.",
+    help="Tune methods on development people only.",
 )  # fmt: skip
 
 
 def worker_options(kind: str) -> Callable[[Callable], Callable]:
-    """The options that say who does the work; they arrive as `workers`, a number, an address or None.
+    """The options for parallel work; they arrive as `workers`, a number, an address or None.
 
     Parameters
     ----------
     kind : str
-        What works on this machine, for the help.
+        Kind of workers on this machine, for the help.
     """
 
     def decorate(command: Callable) -> Callable:
@@ -82,14 +82,14 @@ def worker_options(kind: str) -> Callable[[Callable], Callable]:
 
 
 def detector_options(command: Callable) -> Callable:
-    """The options that say which detector runs, on which weights; they arrive as `**chosen`."""
+    """The options of the detector and its weights; they arrive as `**chosen`."""
     for option in (
         click.option("-o", "--option", "pairs", nargs=2, multiple=True, metavar="NAME VALUE",
                      help="A further option of the detector; may be repeated."),
         click.option("--boxes", help="Where people's boxes come from: gt, image or detected."),
         click.option("--person-model", type=PATH, help="ONNX file that finds the boxes (YOLOX, RTMDet)."),
         click.option("--model", type=PATH, help="The detector's weights, for those that run on yours."),
-        click.option("--detector", required=True, help="Its name; a wrong one lists those there are."),
+        click.option("--detector", required=True, help="Its name; a wrong one lists all names."),
     ):  # fmt: skip
         command = option(command)
     return command
@@ -110,17 +110,17 @@ def text_table(rows: Sequence[Sequence[str]]) -> str:
 
 
 def say(message: object, err: bool = True) -> None:
-    """Print one line, whatever the names in it hold; on the error stream unless `err` is false."""
+    """Print one line, with special characters escaped; on the error stream unless `err` is false."""
     click.echo(printable(str(message)), err=err)
 
 
 def tell_assumed(facts: list[tuple[str, str, str]]) -> None:
-    """Say on the error stream what is assumed about a detector's model and could be otherwise.
+    """Print on the error stream what is assumed about a detector's model.
 
     Parameters
     ----------
     facts : list of (str, str, str)
-        What `hicp_lib.detectors.registry.describe` gives.
+        As from `hicp_lib.detectors.registry.describe`.
     """
     for what, value, why in facts:
         if why.startswith("ASSUMED"):
@@ -128,7 +128,7 @@ def tell_assumed(facts: list[tuple[str, str, str]]) -> None:
 
 
 def given(model: Path | None, person_model: Path | None, boxes: str | None, pairs) -> dict[str, Any]:
-    """The detector's options out of the command line's.
+    """The detector's options from the command line.
 
     Parameters
     ----------

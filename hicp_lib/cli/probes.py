@@ -1,7 +1,7 @@
-"""Small trials of what runs on native libraries: each detector, the renderer, the controller.
+"""Small trials of components that use native libraries: each detector, the renderer, the controller.
 
-`python -m hicp_lib.cli.probes NAME` makes one trial and prints what came of it. The doctor runs each in a
-process of its own: a native library may abort, or hang, and must not take anything along.
+`python -m hicp_lib.cli.probes NAME` runs one trial and prints its result. The doctor runs each in a separate
+process, since a native library may abort or hang.
 """
 
 import sys
@@ -19,11 +19,11 @@ from hicp_lib.core.images import read_image
 from hicp_lib.detectors.registry import DETECTORS, default_detector_names, make_detector
 
 EXIT_FAILED, EXIT_ABSENT = 1, 3
-"""What a trial's process ends with where the trial failed, and where what it needs was not chosen."""
+"""Exit codes if the trial failed, and if an optional part is not installed."""
 
 
 def probes() -> dict[str, Callable[[], str]]:
-    """Trials by name; each returns what it found, or raises. Detectors of one module share a process."""
+    """Trials by name; each returns its finding, or raises. Detectors of one module share a process."""
     by_module: dict[str, list[str]] = {}
     for name in default_detector_names():
         by_module.setdefault(DETECTORS[name].module, []).append(name)
@@ -38,7 +38,7 @@ def _detect(names: list[str]) -> str:
 
 
 def _picture() -> tuple[np.ndarray, str]:
-    """A photograph of a person that Matplotlib ships, or where it is not installed a plain picture."""
+    """A photograph of a person that Matplotlib ships, or without it a plain image."""
     if find_spec("matplotlib") is None:
         return np.full((480, 640, 3), 128, np.uint8), "a plain picture"
     import matplotlib
@@ -66,7 +66,7 @@ def _control() -> str:
 
 
 def main(name: str) -> int:
-    """Make one trial; one line on standard output says what came of it."""
+    """Run one trial; prints its result in one line."""
     end_with(0)
     try:
         print(probes()[name]())

@@ -30,7 +30,7 @@ def simulate(
 ) -> None:
     """Simulate a recording into the folder OUT.
 
-    The relative scenarios show a seated person from many poses of the robot, mocap one who moves, with
+    The relative scenarios show a seated person from many poses of the robot, mocap a moving person with
     motion capture. Finished frames are kept: after an interruption, the same command does only the rest.
     """
     from hicp_lib.experiments.recordings.simulate import simulate_recording
@@ -64,12 +64,12 @@ def check(folder: Path) -> int:
 
 
 def pose_options(command):
-    """Where poses come from that were not recorded with the images."""
+    """Options for poses that were not recorded with the images."""
     for option in (
         click.option("--mount", default="level", show_default=True, type=click.Choice(["level", "tilted"]),
                      help="Camera holder, for joints."),
         click.option("--poses", type=PATH,
-                     help="Camera poses (TUM text; one line: it stands still), or joints (CSV)."),
+                     help="Camera poses (TUM text; one line: static camera), or joints (CSV)."),
     ):  # fmt: skip
         command = option(command)
     return command
@@ -80,8 +80,8 @@ def pose_options(command):
 @click.option("--bag", type=PATH, help="A bag of ROS 1, ROS 2 or RealSense: file, or ROS 2's folder.")
 @click.option("--color-topic", help="Topic of colour, where a bag has several.")
 @click.option("--depth-topic", help="Topic of depth, where a bag has several.")
-@click.option("--base-frame", help="Poses are the camera's in this frame, by the bag's transforms.")
-@click.option("--joint-states", is_flag=True, help="Poses are by the bag's angles of the iCub's joints.")
+@click.option("--base-frame", help="Camera poses in this frame, from the bag's transforms.")
+@click.option("--joint-states", is_flag=True, help="Camera poses from the iCub's joint angles in the bag.")
 @click.option("--open3d", "folder", type=PATH, help="A folder with color/, depth/ and intrinsic.json.")
 @click.option("--rate", type=FiniteRange(min=0, min_open=True), help="Frames per second of a folder.")
 @click.option("--depth-scale", type=FiniteRange(min=1), help="Depth units per metre of a folder.")
@@ -89,7 +89,7 @@ def pose_options(command):
 def import_(
     out, bag, color_topic, depth_topic, base_frame, joint_states, folder, rate, depth_scale, poses, mount
 ):
-    """Make a recording in the folder OUT of what ROS, RealSense's or Open3D's tools saved.
+    """Make a recording in the folder OUT from files of ROS, RealSense or Open3D tools.
 
     Without --poses, --base-frame or --joint-states the camera's own frame is the base frame.
     """
@@ -124,10 +124,10 @@ def _tell(out: Path, n_frames: int, notes: list[str]) -> None:
 @click.option("--depth", "depth_px", nargs=2, type=int, default=(848, 480), help="Width, height: 848 480.")
 @click.option("--rate", "rate_hz", default=30, show_default=True, type=int, help="Frames per second.")
 @click.option("--seconds", "duration_s", type=FiniteRange(min=0), help="Until Ctrl-C if not given.")
-@click.option("--joints", type=click.File(), help="Lines of joint angles as they come; - is standard input.")
+@click.option("--joints", type=click.File(), help="Lines of joint angles; - is standard input.")
 @pose_options
 def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> None:
-    """Record from a RealSense into the folder OUT, until Ctrl-C; what the camera gave stays in OUT.db3."""
+    """Record from a RealSense into the folder OUT, until Ctrl-C; the raw streams stay in OUT.db3."""
     from hicp_lib.recordings.importing import read_pose_source
     from hicp_lib.recordings.realsense import record_camera
 
@@ -145,7 +145,7 @@ def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> Non
 @click.option("--out", type=PATH, required=True, help="Table to write: FILE.parquet, or FILE.csv.")
 @worker_options("Threads")
 def lift(folder: Path, detector: str, method: str, out: Path, workers: int | str | None, **chosen) -> None:
-    """Find people in a recording and where their keypoints are in the robot's base frame."""
+    """Find people in a recording, and lift their keypoints to the robot's base frame."""
     from hicp_lib.detectors.runtime.results import detections_of
     from hicp_lib.detectors.runtime.run import detect_images
     from hicp_lib.formats.detection_files import refuse_other_suffix

@@ -1,6 +1,6 @@
-"""Shared libraries that the environment's wheels load and do not bring.
+"""Shared libraries that the environment's wheels load but do not contain.
 
-The list is held against the wheels' own word by `tests/test_system_libraries.py`.
+`tests/cli/test_system_libraries.py` compares the list with the wheels' own shared objects.
 `python -m hicp_lib.cli.system_libraries` prints the Debian packages that are missing. It imports
 nothing but the standard library: it runs before anything else can.
 """
@@ -23,7 +23,7 @@ LIBRARIES = {
 
 
 def missing_packages() -> list[str]:
-    """Debian packages of libraries that what is installed needs and that cannot be loaded; on Linux only."""
+    """Debian packages of libraries that installed packages need and that cannot be loaded; on Linux only."""
     if sys.platform != "linux":
         return []
     return [

@@ -1,4 +1,4 @@
-"""Rigid alignment of matched 3D points, and how far it can be trusted."""
+"""Rigid alignment of matched 3D points, and measures of its reliability."""
 
 from dataclasses import dataclass
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 
-# Second over first singular value of the centred points. Below it they are a line: a metre of line with
-# a millimetre of noise across says nothing about the turn around it.
+# Second over first singular value of the centred points. Below it they count as a line: one of a metre with a
+# millimetre of noise does not determine the rotation about itself.
 MIN_SPREAD_RATIO = 1e-3
 
 
@@ -20,13 +20,13 @@ class RigidFit:
     T_b_a : array, shape (4, 4)
         Takes coordinates in a to coordinates in b.
     residuals_m : array, shape (n,)
-        Distance of each point in b from where the fit puts its partner.
+        Distance of each point in b from its transformed partner.
     leave_one_out_m : array, shape (n,)
-        The same under the fit of all *other* points, which the point itself did not pull towards it; NaN
+        The same with the transform fitted to all *other* points, which the point does not influence; NaN
         where the others do not determine a transform.
     spread_ratio : float
-        Second over first singular value of the centred points, the smaller of a's and b's; 0 for points on a
-        line.
+        Second over first singular value of the centred points, the smaller of those of a and b; 0 for points
+        on a line.
     """
 
     T_b_a: np.ndarray
@@ -51,7 +51,7 @@ def arun(points_a_m: np.ndarray, points_b_m: np.ndarray, about_origin: bool = Fa
     points_a_m, points_b_m : array, shape (n, 3)
         Row i of one is row i of the other; n >= 3.
     about_origin : bool, optional
-        Take a's origin to b's exactly, and only turn about it.
+        Map a's origin to b's exactly, and fit the rotation only.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """Keys of cached results: the code that makes a result, its data, the libraries it calls, its inputs.
 
-The code is found, not listed: every module of the library that the entry points import, wherever in their
-code, or name in a string that holds nothing else, and what these import in turn (the *import closure*). So a
-module that moves, or is imported anew, is part of the key by itself.
+The code is found automatically: every module of the library that the entry points import, anywhere in their
+code, or name in a string of its own, and what these import in turn (the *import closure*). A module that
+moves, or a new import, becomes part of the key without further work.
 """
 
 import ast
@@ -25,7 +25,7 @@ from hicp_lib.core.files import sha256_bytes, sha256_file
 
 LIBRARY_DIR = Path(__file__).resolve().parents[1]
 
-# Distributions whose name is not that of what is imported; of several, the one that is installed.
+# Distributions whose name differs from that of the imported package; of several, the installed one counts.
 _DISTRIBUTIONS = {
     "bs4": ("beautifulsoup4",),
     "PIL": ("pillow",),
@@ -42,7 +42,7 @@ ALL_DATA = "**/*"
 
 @dataclass(frozen=True)
 class Code:
-    """What results of some entry points follow from, besides their inputs.
+    """What the results of some entry points depend on, besides their inputs.
 
     Attributes
     ----------
@@ -71,17 +71,17 @@ def key(entry_points: Sequence[Any], *, without: Sequence[str] = (), **inputs: A
     Parameters
     ----------
     entry_points : sequence of callable or module or str
-        What makes the result. All code is counted that they import, and all that imports in turn.
+        What makes the result. All code that they import, directly or indirectly, is part of the key.
     without : sequence of str
-        Names of modules where that stops: what they do to the result is said by `inputs`.
+        Names of modules to leave out: their effect on the result is described by `inputs`.
     **inputs : any
-        What the code is given, by any names: plain values, arrays, tables, dataclasses of these; a path
-        counts by the names, sizes and times of its files.
+        The code's inputs, under any names: plain values, arrays, tables, dataclasses of these; of a path, the
+        names, sizes and modification times of its files are used.
 
     Raises
     ------
     TypeError
-        For an input whose content is not known.
+        For an input of an unsupported type.
 
     Examples
     --------
@@ -93,14 +93,14 @@ def key(entry_points: Sequence[Any], *, without: Sequence[str] = (), **inputs: A
     return digest([asdict(running_code(names, tuple(without))), content(inputs)])
 
 
-@cache  # what a process runs is what it first loaded, whatever becomes of the files
+@cache  # a process runs the code that it loaded first, even if the files change
 def running_code(names: tuple[str, ...], without: tuple[str, ...] = ()) -> Code:
-    """As `code`, of what this process runs."""
+    """As `code`, for the code that this process runs."""
     return code(names, without=without)
 
 
 def code_identity(*names: str) -> dict[str, Any]:
-    """In short, what of a result follows from modules that this process runs.
+    """A short identity of modules as this process runs them, for cache keys.
 
     Parameters
     ----------
@@ -127,16 +127,16 @@ def code(
     Parameters
     ----------
     names : iterable of str
-        Modules; what is not of the library counts as a library that is called.
+        Modules; one that is not part of this library counts as another library.
     without : sequence of str
-        Modules that are left out, with what only they import.
+        Modules to leave out, together with what only they import.
     library, data : Path, optional
-        Folders of the library's code and of its data, where they are not those that are running.
+        Folders of the library's code and data, if not those of the running library.
 
     Raises
     ------
     InputError
-        If data that the code names are not there.
+        If data that the code names are missing.
 
     Examples
     --------
@@ -159,7 +159,7 @@ def code(
             others.add(name.partition(".")[0])
     patterns = frozenset().union(*(module.data for module in modules.values()))
     return Code(
-        # In order: as inputs of keys their order counts, and that of a set differs from process to process.
+        # Sorted, since keys depend on their order, and that of a set differs from process to process.
         {name: modules[name].sha256 for name in sorted(modules)},
         _data_sha256(patterns, data or DATA_DIR),
         {name: _version(name) for name in sorted(others - sys.stdlib_module_names)},
@@ -167,7 +167,7 @@ def code(
 
 
 def imports_of(source: str | bytes) -> frozenset[str]:
-    """Names of what Python code imports, wherever in it; not what it imports for type checks alone.
+    """Names that Python code imports, anywhere in it, except imports for type checks only.
 
     Examples
     --------
@@ -178,7 +178,7 @@ def imports_of(source: str | bytes) -> frozenset[str]:
 
 
 def content(value: Any) -> Any:
-    """What JSON can hold and differs where a value differs.
+    """A JSON-able value that differs whenever the given value differs.
 
     Parameters
     ----------
@@ -235,11 +235,11 @@ def files_sha256(paths: Iterable[Path], base: Path) -> str:
     Raises
     ------
     InputError
-        If there is none of them: the hash of nothing would call two results alike that are not.
+        If there are none: the hash of nothing would make different results look equal.
     """
     hashes = {path.relative_to(base).as_posix(): sha256_file(path) for path in paths}
     if not hashes:
-        raise InputError(f"{base}: the files that a result follows from are not there; install hicp anew")
+        raise InputError(f"{base}: the files that a result depends on are missing; reinstall hicp")
     return digest(hashes)
 
 
@@ -251,7 +251,7 @@ def input_sha256(path: Path) -> str:
     Raises
     ------
     InputError
-        If it is neither, or links of the folder lead in a circle.
+        If it is neither, or links in the folder form a cycle.
     """
     if path.is_file():
         return sha256_file(path)
@@ -262,7 +262,7 @@ def input_sha256(path: Path) -> str:
 
 
 def files_below(folder: Path, above: frozenset[Path] = frozenset()) -> Iterator[Path]:
-    """Every file in a folder and in those below it, through links too.
+    """Every file in a folder and its subfolders, following links.
 
     Parameters
     ----------
@@ -339,13 +339,13 @@ def _data_sha256(patterns: Iterable[str], data: Path) -> dict[str, str]:
     for pattern in patterns:
         found = [p for p in data.glob(pattern) if p.is_file() and data / REFERENCE_DIR.name not in p.parents]
         if not found:
-            raise InputError(f"{data / pattern}: is not there, and a result follows from it; reinstall hicp")
+            raise InputError(f"{data / pattern}: is missing, and a result depends on it; reinstall hicp")
         paths.update(found)
     return {path.relative_to(data).as_posix(): _file_sha256(path, *_state(path)) for path in sorted(paths)}
 
 
 def _state(path: Path) -> tuple[int, int]:
-    """What differs when a file was written anew."""
+    """What changes when a file is rewritten."""
     state = path.stat()
     return state.st_mtime_ns, state.st_size
 

@@ -1,7 +1,7 @@
-"""Tables cached on disk: what was made once of the same inputs with the same code is read, not made again.
+"""Tables cached on disk: a table made by the same code from the same inputs is read, not made again.
 
-A notebook that is opened after a report so shows the report's numbers, and soon, whatever threads its
-process has.
+So a notebook that is opened after a report shows the report's numbers quickly, independent of its process's
+threads.
 """
 
 import inspect
@@ -16,16 +16,16 @@ from hicp_lib.core.files import cache_dir, read_checked, write_checked
 
 
 def cached(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> pd.DataFrame:
-    """The table ``make(*arguments, **named)``, made only if it is not there.
+    """The table ``make(*arguments, **named)``, made only if it is not in the cache.
 
     The key is all it depends on (`hicp_lib.core.cache.key`): the function and what it imports, and its
-    inputs. A damaged file is never an answer: the table is made again. What is returned was read from what
-    the file holds, the first time too.
+    inputs. If the file is damaged, the table is made again. The returned table is always read from the file's
+    content, also the first time.
 
     Parameters
     ----------
     make : callable
-        A function of `hicp_lib` whose result follows from its inputs.
+        A function of `hicp_lib` whose result depends on its inputs only.
     *arguments, **named : any
         Its inputs, as `hicp_lib.core.cache.key` takes them.
 

@@ -105,7 +105,7 @@ def transform(T: np.ndarray, points: np.ndarray) -> np.ndarray:
     T : array, shape (..., 4, 4)
         Rigid transforms.
     points : array, shape (..., n, 3) or (3,)
-        With the leading axes of T, or what broadcasts with them; (3,) with a single T.
+        With the leading axes of T, or axes that broadcast with them; (3,) with a single T.
 
     Returns
     -------

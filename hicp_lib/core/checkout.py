@@ -1,4 +1,4 @@
-"""Where the study's notebooks and book are, and where results go: never beside installed code."""
+"""Where the study's notebooks and book are, and where results go: never next to installed code."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ _MARK = Path("notebooks", "profiles.toml")
 _BESIDE_LIBRARY = Path(__file__).resolve().parents[2]
 
 CHECKOUT: Path | None = _BESIDE_LIBRARY if (_BESIDE_LIBRARY / _MARK).is_file() else None
-"""The checkout that the library itself runs from; None where it was installed."""
+"""The checkout that the library runs from; None if it was installed from a wheel."""
 
 # Set for the kernel of a run: where its results go, where those of earlier notebooks are, and the profile's
 # name. Absent in Jupyter.
@@ -18,19 +18,19 @@ PROFILE_VARIABLE = "HICP_PROFILE"
 
 
 def working_folder() -> Path:
-    """Where results go: the working folder, or the study around it, since Jupyter works in `notebooks`."""
+    """Where results go: the working folder, or in a checkout its top, since Jupyter works in `notebooks`."""
     here = Path.cwd()
     return _study_around(here) or here
 
 
 def sources() -> Path:
-    """The study to run: the library's own checkout, or if it has none the one the working folder lies in.
+    """The study to run: the library's own checkout, or else the one that contains the working folder.
 
     Raises
     ------
     InputError
-        If there is neither, since an installed package brings the library, not the notebooks; or both, since
-        notebooks are code, and those in a folder of data must not stand in for the study's.
+        If there is neither, since an installed package contains the library but no notebooks; or both, since
+        notebooks are code, and those in a data folder must not replace the study's own.
     """
     around = _study_around(Path.cwd())
     if CHECKOUT and around not in (None, CHECKOUT):

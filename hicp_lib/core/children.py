@@ -1,7 +1,7 @@
-"""Processes that this one starts: none imports from the working folder, none outlives this one.
+"""Child processes: none imports from the working folder, none outlives this process.
 
-A data folder may hold a `numpy.py`. Python puts the working folder on the path of `-m` and `-c`, before its
-own library; Jupyter puts it on that of notebooks, and multiprocessing hands it on from there.
+A data folder may contain a file `numpy.py`. With `-m` and `-c` Python puts the working folder first on its
+path, Jupyter does so for notebooks, and multiprocessing passes that path on.
 """
 
 import os
@@ -17,12 +17,12 @@ from hicp_lib.core.environment import with_variables
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 ONE_THREAD = dict.fromkeys(_THREADS, "1")
-"""Variables that hold a process's linear algebra to one thread, read when its library is loaded."""
+"""Variables that limit a process's linear algebra to one thread; read when its library is loaded."""
 _SAFE_PATH = {"PYTHONSAFEPATH": "1"}
 
 
 def child_environment(**variables: str) -> dict[str, str]:
-    """This process's variables for a program that it starts, and some more.
+    """Environment variables for a child process: this process's own, made safe, and further ones.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def safe_start() -> Iterator[None]:
 
 
 def begin(pipe: Connection) -> None:
-    """What a process of a pool does first, before it imports what takes long: see that it ends.
+    """First call in a pool's process, before slow imports: makes it end together with the pool.
 
     Parameters
     ----------
@@ -62,29 +62,29 @@ def begin(pipe: Connection) -> None:
 
 @contextmanager
 def lifeline() -> Iterator[int]:
-    """A standard input for a program that calls `end_with(0)`: it ends with the block, at the latest."""
+    """A standard input for a program that calls `end_with(0)`, which ends with the block at the latest."""
     theirs, ours = os.pipe()
     with open(theirs, "rb"), open(ours, "wb"):
         yield theirs
 
 
 def end_with(descriptor: int) -> None:
-    """End this process when the other end of a pipe closes, to which nothing is ever written.
+    """End this process when the other end of a pipe closes; nothing is ever written to the pipe.
 
-    So it ends however the process at the other end dies. Linux tells by a signal, at once; elsewhere a thread
-    waits, which may have to wait for a library's call to end.
+    So it ends no matter how the process at the other end dies. Linux signals this at once; elsewhere a thread
+    waits for it, which may have to wait for a library's call to return.
 
     Parameters
     ----------
     descriptor : int
-        Of the pipe's end that is read.
+        Of the pipe's reading end.
     """
     own = os.dup(descriptor)
     threading.Thread(target=lambda: os._exit(1 + len(os.read(own, 1))), daemon=True).start()
     with suppress(ImportError, OSError, AttributeError):
         import fcntl
 
-        # Opened anew: flags and owner are of what was opened, which all who inherited it share.
+        # Reopened: flags and owner belong to the open file description, which all heirs of the pipe share.
         anew = os.open(f"/proc/self/fd/{own}", os.O_RDONLY | os.O_NONBLOCK)
         fcntl.fcntl(anew, fcntl.F_SETOWN, os.getpid())
         fcntl.fcntl(anew, fcntl.F_SETFL, os.O_NONBLOCK | os.O_ASYNC)

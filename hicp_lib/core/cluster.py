@@ -1,9 +1,9 @@
 """Jobs on an existing Dask cluster.
 
-Their inputs and the files they write travel, not paths, so no folder need be shared. Scheduler and workers
-need this package as it is installed here; a worker that would find something else (other code, libraries,
-weights, settings) refuses. A job whose worker dies goes to another; Dask gives up on it when it has outlived
-as many workers as Dask's setting `distributed.scheduler.allowed-failures` says.
+Inputs and output files are sent, not paths, so no shared folder is needed. Scheduler and workers need this
+package as it is installed here; a worker that would compute something else (other code, libraries, weights,
+settings) refuses. A job whose worker dies is given to another, until it has lost as many workers as Dask's
+setting `distributed.scheduler.allowed-failures` allows.
 
 Dask's workers execute what its clients send them: connect only to a cluster you trust.
 """
@@ -40,9 +40,9 @@ if TYPE_CHECKING:
 
 Key = TypeVar("Key", bound=Hashable)
 Answer = TypeVar("Answer")
-# How long to wait for the scheduler, and for workers where there are none: at first, and later.
+# How long to wait for the scheduler, and for workers if there are none: at the start, and later.
 SOON_S, PATIENCE_S = 3.0, 30.0
-_ANEW_S = 1.0  # when to look again how many workers there are
+_ANEW_S = 1.0  # interval between counts of the workers
 _LOGGERS = ("distributed", "distributed.client", "tornado.application", "asyncio")
 
 
@@ -50,7 +50,7 @@ def run_on_cluster(
     address: str, jobs: Iterable[tuple[Key, Callable | None]], kind: str, folder: Path | None, alike:
     Callable[[], dict] | None, named: Callable[[Key], object],
 ) -> Iterator[tuple[Key, Any]]:  # fmt: skip
-    """As `hicp_lib.core.executor.run_jobs`, by the workers of a cluster; without jobs nobody is asked.
+    """As `hicp_lib.core.executor.run_jobs`, on the workers of a cluster; without jobs it is not contacted.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def run_on_cluster(
     ------
     InputError
         If the extra is not installed, the cluster cannot be reached, has no workers or loses them, a worker
-        would find something else, or a job kills its workers.
+        would compute something else, or a job kills its workers.
     """
     todo = iter(jobs)
     for first in todo:
@@ -111,7 +111,7 @@ def connected(address: str) -> Iterator[Client]:
     Raises
     ------
     InputError
-        If the extra is not installed, nobody answers, or there are no workers.
+        If the extra is not installed, no scheduler answers, or there are no workers.
     """
     with needs("dask"):
         from distributed import Client
@@ -122,7 +122,7 @@ def connected(address: str) -> Iterator[Client]:
             with ThreadPoolExecutor(1) as thread:  # a notebook's own has a loop already
                 thread.submit(asyncio.run, _greet(address, soon_s)).result()
             client = Client(address, timeout=soon_s)
-        except Exception as error:  # what is no scheduler may say anything
+        except Exception as error:  # another kind of server may answer anything
             raise InputError(
                 f"{address}: no Dask scheduler answers ({one_line(error)}); give tcp://HOST:PORT"
             ) from None
@@ -134,12 +134,12 @@ def connected(address: str) -> Iterator[Client]:
                     raise InputError(f"{address}: the Dask cluster has no workers; start some") from None
             yield client
         finally:
-            with suppress(OSError, RuntimeError):  # it may be gone; what was found is here
+            with suppress(OSError, RuntimeError):  # it may be gone; the results have been received
                 client.close()
 
 
 async def _greet(address: str, soon_s: float) -> None:
-    """Raise unless a scheduler says in time that it is one: Dask's client waits for minutes for others."""
+    """Raise unless a scheduler answers as one in time: Dask's client waits for minutes for other servers."""
     from distributed import Security
     from distributed.core import rpc
 
@@ -152,10 +152,10 @@ async def _greet(address: str, soon_s: float) -> None:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep Dask from telling at length, while it reconnects and closes, what is told in one line.
+    """Suppress Dask's long log messages while it reconnects and closes; the error is one line instead.
 
-    Which of its parts notices first that a scheduler is gone depends on what was under way, so all are
-    kept quiet: its own loggers, of which some have a level to themselves, and those of the loop it runs in.
+    Which of its parts notices first that a scheduler is gone depends on what it was doing, so all are
+    silenced: its own loggers, some of which have their own level, and those of its event loop.
     """
     logs = [logging.getLogger(name) for name in _LOGGERS]
     levels = [log.level for log in logs]
@@ -172,14 +172,14 @@ def _spread(
     client: Client, address: str, jobs: Iterable[tuple[Key, Callable | None]], how: tuple, named:
     Callable[[Key], object],
 ) -> Iterator[tuple[Key, Any]]:  # fmt: skip
-    """What jobs return, or what went wrong, as it comes in."""
+    """Results or errors of jobs, as they arrive."""
     from distributed import wait
 
     def submit(job: Callable) -> Any:
         with warnings.catch_warnings():
             # Dask would have large arguments scattered; but scattered data is lost with its worker.
             warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
-            # One callable: what is an argument, Dask walks through to its last key.
+            # One callable, since Dask walks through arguments down to the last key.
             return client.submit(partial(_here, job, *how), pure=False)
 
     def first_ones(futures: Iterable) -> Iterable:
@@ -190,7 +190,7 @@ def _spread(
 
     def n_most() -> float:
         nonlocal asked_s, n_threads
-        # To ask the scheduler takes as long as to give a job away.
+        # Asking the scheduler takes as long as submitting a job.
         if not n_threads or time.monotonic() > asked_s + _ANEW_S:
             asked_s, n_threads = time.monotonic(), sum(client.nthreads().values())
         return 2 * n_threads or math.inf
@@ -206,20 +206,20 @@ def _spread(
 
 
 def _not_run(error: Exception, name: object) -> InputError:
-    """Why Dask could not run `_here`, in one line: what goes wrong within comes back as its result."""
+    """Why Dask could not run `_here`, in one line; errors inside it are returned as its result."""
     from distributed import KilledWorker
 
     if isinstance(error, KilledWorker):
         last = getattr(error.last_worker, "address", "an unknown one")
-        return InputError(f"{name}: every worker that took it died, lately {last}")
+        return InputError(f"{name}: every worker that ran it died, most recently {last}")
     return InputError(
-        f"the Dask cluster cannot run what it is asked to ({one_line(error)}); "
+        f"the Dask cluster cannot run its jobs ({one_line(error)}); "
         "install the same environment and weights on scheduler and workers"
     )
 
 
 def _patiently(client: Client, ask: Callable[[float], Answer]) -> Answer:
-    """Ask until there is an answer, however long it takes, but only as long as there are workers."""
+    """Ask until there is an answer, with no time limit, while there are workers."""
     while True:
         try:
             return ask(PATIENCE_S)
@@ -230,31 +230,31 @@ def _patiently(client: Client, ask: Callable[[float], Answer]) -> Answer:
 
 @contextmanager
 def _explained(address: str, client: Client) -> Iterator[None]:
-    """Around calls of Dask's alone: tell in one line that the cluster is gone, however it shows."""
+    """Around calls of Dask only: report in one line that the cluster is gone, whatever exception shows it."""
     from distributed.client import ClosedClientError
 
     try:
         yield
     except (CancelledError, OSError, ClosedClientError, AttributeError, RuntimeError) as error:
-        # A client that has closed has no scheduler or loop to ask; of one that runs it would be a fault.
+        # A closed client has no scheduler or loop; with an open one, this error would be a bug.
         if isinstance(error, (AttributeError, RuntimeError)) and client.status == "running":
             raise
         raise InputError(
-            f"{address}: the Dask cluster is gone ({one_line(error)}); run the same command again to go on"
+            f"{address}: the Dask cluster is gone ({one_line(error)}); run the same command again to continue"
         ) from None
 
 
-# What follows runs on the workers.
+# Everything below runs on the workers.
 
 _checking, _alone = threading.Lock(), threading.Lock()
 
 
 def _here(*arguments: Any) -> Any:
-    """What `_run` returns or raises: an error that Dask raises in its place is then Dask's own."""
+    """What `_run` returns or raises, as a value, so that any exception raised is Dask's own."""
     try:
         return _run(*arguments)
     except Exception as error:
-        error.add_note(traceback.format_exc())  # errors travel without
+        error.add_note(traceback.format_exc())  # errors are sent without it
         return error
 
 
@@ -270,15 +270,15 @@ def _run(job: Callable, expected: dict, found_there: Callable[[], dict], write: 
         raise InputError(f"worker {worker}: {one_line(error)}") from None
     if differing:
         raise InputError(
-            f"worker {worker}: would find something else, for these differ from here: "
-            f"{', '.join(differing)}; install the same environment and weights, and start it anew"
+            f"worker {worker}: would compute something else, since these differ from here: "
+            f"{', '.join(differing)}; install the same environment and weights, and restart it"
         )
     with _alone if alone else nullcontext():
         return _with_files(job) if write else job()
 
 
 def _with_files(job: Callable[[Path], Any]) -> tuple[Any, dict[str, bytes]]:
-    """What a job returns, and what it wrote."""
+    """What a job returns, and the files it wrote."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         result = job(folder)
@@ -287,7 +287,7 @@ def _with_files(job: Callable[[Path], Any]) -> tuple[Any, dict[str, bytes]]:
 
 
 def _differences(one: object, other: object, where: str = "") -> list[str]:
-    """The keys of nested dictionaries under which there is not the same."""
+    """The keys of nested dictionaries whose values differ."""
     if not (isinstance(one, dict) and isinstance(other, dict)):
         return [] if one == other else [where]
     return [

@@ -1,6 +1,7 @@
-"""Where the study's own data lie: the folder `data` at the top of a checkout, within the installed package.
+"""Where the study's data are: the folder `data` at the top of a checkout, or inside the installed package.
 
-They are only read. What is made or recorded goes to the working folder, the cache or the user's data folder.
+They are only read. Files that are made or recorded go to the working folder, the cache or the user's data
+folder.
 """
 
 import zipfile
@@ -16,18 +17,18 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def data_dir(package: Path = _PACKAGE) -> Path:
-    """The data of the library in the folder `package`: within it where a wheel put them, else beside it."""
+    """The data of the library in the folder `package`: inside it if installed by a wheel, else beside it."""
     within = package / "data"
     return within if (within / "detectors.json").is_file() else package.parent / "data"
 
 
 DATA_DIR = data_dir()
 REFERENCE_DIR = DATA_DIR / "reference"
-"""Results of runs that others are compared with: no result follows from them, and so no key."""
+"""Reference results for comparison: no result depends on them, so they are not part of cache keys."""
 
 
 def read_arrays(path: Path, shapes: Mapping[str, tuple[int, ...]], what: str, tool: str) -> list[np.ndarray]:
-    """Arrays of a file that a tool of this project made.
+    """Arrays from a file made by one of this project's tools.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ def read_arrays(path: Path, shapes: Mapping[str, tuple[int, ...]], what: str, to
     shapes : mapping of str to tuple of int
         Shape of each array to read, by name; -1 where any length will do.
     what, tool : str
-        What the file holds and what makes it, for the error's message.
+        What the file contains and which tool makes it, for the error message.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What every detector is: an image in, people in the Halpe-136 layout out."""
+"""The interface of every detector: an image in, people in the Halpe-136 layout out."""
 
 from __future__ import annotations
 
@@ -36,24 +36,24 @@ class Detections:
     person_scores: np.ndarray
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():  # as files keep them, found anew or not
+        for name, value in vars(self).items():  # as files have it: new and cached results are equal
             object.__setattr__(self, name, np.asarray(value, float))
 
     @classmethod
     def none(cls) -> Detections:
-        """Nobody found."""
+        """The result if nobody was found."""
         return cls(np.full((0, N_KEYPOINTS, 2), np.nan), np.zeros((0, N_KEYPOINTS)), np.zeros(0))
 
     @classmethod
     def of_parts(
         cls, positions_px: np.ndarray, scores: np.ndarray, person_scores: np.ndarray, convention: str
     ) -> Detections:
-        """People from the keypoints a network gives; who has none is nobody.
+        """People from the keypoints of a network; those without any keypoint are dropped.
 
         Parameters
         ----------
         positions_px : array, shape (n, k, 2)
-            NaN where not given; the score is then 0, whatever it was.
+            NaN where not given; the score then becomes 0.
         scores : array, shape (n, k)
             In [0, 1].
         person_scores : array, shape (n,)
@@ -82,15 +82,15 @@ class Detections:
 class Detector(Protocol):
     """A keypoint detector, ready to run.
 
-    A detector with a true attribute `takes_boxes` is given the people's boxes, `detect(image, boxes_px)`. One
-    that is made of others has them in a dictionary `parts` and asks them there, so that their answers can be
-    cached (see `hicp_lib.detectors.runtime.cached_parts`). One whose first call would take longer than the
-    others, since something is started for it, starts that in a method `start()` too, if it is called before.
+    A detector with a true attribute `takes_boxes` gets the people's boxes, `detect(image, boxes_px)`. A
+    detector composed of others has them in a dictionary `parts` and calls them there, so that their results
+    can be cached (see `hicp_lib.detectors.runtime.cached_parts`). A detector whose first call has to start
+    something may offer a method `start()`, which does so in advance.
 
     Attributes
     ----------
     name : str
-        Of its results.
+        Name of its results.
     settings : dict
         JSON-able (weights' SHA-256, thresholds, versions that matter); identifies its results: two detectors
         with equal name and settings give equal detections.

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 
 class InputError(ValueError):
-    """Something read from outside is not what was expected.
+    """External input (a file, an option) is not as expected.
 
     The message is one line that names the file (and the row or key), what was
     expected, and what to do about it. The command line prints it and exits 2.
@@ -12,7 +12,7 @@ class InputError(ValueError):
 
 
 def refuse_unknown(what: str, value: str, known: Iterable[str]) -> None:
-    """Tell a value that is none of those there are.
+    """Raise an error for a value that is not one of the known ones.
 
     Parameters
     ----------
@@ -37,12 +37,12 @@ def refuse_unknown(what: str, value: str, known: Iterable[str]) -> None:
 
 
 def one_line(error: BaseException) -> str:
-    """What another library's exception says, in one line of at most 300 characters; its type if nothing."""
+    """The message of another library's exception, in at most 300 characters; its type if it has none."""
     return " ".join(str(error).split())[:300] or type(error).__name__
 
 
 def printable(text: str, kept: str = "") -> str:
-    r"""Text without characters that a terminal obeys, or shows as nothing: their escapes stand for them.
+    r"""Text with control and invisible characters replaced by their escapes.
 
     Examples
     --------

@@ -7,16 +7,16 @@ _SPACES = re.compile(r"\s+")
 
 
 def escaped(text: object) -> str:
-    """Text that is shown as it is, in Markdown (also in its tables, links and raw HTML) and in HTML.
+    """Text that Markdown (including its tables, links and raw HTML) and HTML show literally.
 
-    What means something there becomes a numeric character reference, in which both see nothing but the
-    character. It is one line, since a line's end ends a table's row, and an empty line a block of HTML, with
-    single spaces; what cannot be printed is replaced.
+    Characters with a meaning there become numeric character references. The result is one line with single
+    spaces, since a line break would end a table row, and an empty line a block of HTML; unprintable
+    characters are replaced.
 
     Parameters
     ----------
     text : object
-        A text, or what is turned into one.
+        A text, or an object that is converted to one.
 
     Examples
     --------

@@ -1,8 +1,8 @@
-"""One way to spread work: threads or processes of this machine, or the workers of a Dask cluster.
+"""One interface for parallel work: threads or processes of this machine, or the workers of a Dask cluster.
 
-Whoever has jobs says which of the two they ask for here, and takes as `workers` what the user gave: a number,
-the address of a Dask scheduler, or nothing, which is what `HICP_DASK` names, else all cores. Neither the
-number nor the place is in any result.
+The caller says whether jobs run in threads or processes here, and passes the user's `workers`: a number, the
+address of a Dask scheduler, or nothing, which means the cluster that `HICP_DASK` names, else all cores.
+Results depend neither on the number of workers nor on where they run.
 """
 
 import multiprocessing
@@ -34,7 +34,7 @@ _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+:\d{1,5}")
 
 
 def resolved(workers: Workers) -> int | str:
-    """How many workers of this machine, or the address of the cluster whose workers are asked for.
+    """The number of workers on this machine, or the address of the cluster to use.
 
     Parameters
     ----------
@@ -65,24 +65,25 @@ def run_jobs(
     jobs: Iterable[tuple[Key, Callable | None]], workers: Workers = None, kind: str = "processes", *, folder:
     Path | None = None, alike: Callable[[], dict] | None = None, named: Callable[[Key], object] = str,
 ) -> Iterator[tuple[Key, Any]]:  # fmt: skip
-    """Run jobs, several at a time; each one's key and what it returned, as they come in.
+    """Run jobs in parallel; yields each one's key and result, as they arrive.
 
     Parameters
     ----------
     jobs : iterable of (key, callable)
-        Drawn as workers get free. Processes and clusters are given functions of modules, or partials of
-        them; threads anything. None in place of a callable is done already: its key comes back with None.
+        Taken as workers become free. Processes and clusters need functions of modules, or partials of them;
+        threads take anything. None in place of a callable means already done: its key is yielded with None.
     workers : int or str, optional
-        As of `resolved`. A single one, or a single job, is run by the caller itself.
+        As of `resolved`. With one worker, or one job, the calling thread does the work.
     kind : str
-        "threads" or "processes": what works here. A cluster's worker runs those for processes one at a time.
+        "threads" or "processes": what is used on this machine. A cluster's worker runs jobs for processes one
+        at a time.
     folder : Path, optional
-        Jobs are called with it and write files there. On a cluster, whose machines need not see it, they are
-        called with one of their own, and the files travel. Of a job's files, that which its key names, if it
-        names one (a path below `folder`), is there when all others are.
+        Jobs are called with it and write files there. On a cluster, whose machines need no access to it, they
+        get a folder of their own, and their files are sent back. If a job's key names one of its files (a
+        path below `folder`), that file appears after all others.
     alike : callable, optional
-        Says what results depend on where it is called, JSON-able; a cluster's worker where it is not what it
-        is here is refused. The code of the first job where left out.
+        Returns what results depend on at the place where it is called, JSON-able; a cluster's worker that
+        returns something else than this machine is refused. By default the code of the first job.
     named : callable, optional
         What a message calls a job, by its key.
 
@@ -93,7 +94,7 @@ def run_jobs(
     Raises
     ------
     InputError
-        If a process dies, or for all that can be amiss with a cluster (`hicp_lib.core.cluster`).
+        If a process dies, or for problems with a cluster (`hicp_lib.core.cluster`).
 
     Examples
     --------
@@ -119,13 +120,13 @@ def run_jobs(
                     yield key, future and future.result()
             except BrokenProcessPool:
                 raise InputError(
-                    "a process that worked was killed (is memory short?); run the same command again to go "
+                    "a worker process was killed (is memory short?); run the same command again to go "
                     "on, with fewer workers if it happens again"
                 ) from None
 
 
 def threads_beside() -> int:
-    """How many threads of a cluster's worker do jobs, this one among them; 1 elsewhere."""
+    """Number of threads that run jobs in this cluster worker, including this one; 1 elsewhere."""
     with needs("dask"):
         from distributed import get_worker
 
@@ -139,17 +140,17 @@ def as_they_come(
     jobs: Iterable[tuple[Key, Callable | None]], submit: Callable[[Callable], Any], first_ones:
     Callable[[Iterable], Iterable], n_most: Callable[[], float],
 ) -> Iterator[tuple[Key, Any]]:  # fmt: skip
-    """Keys and ended futures of jobs; no more are under way than keep all workers busy.
+    """Keys and finished futures of jobs; only as many are submitted as keep all workers busy.
 
     Parameters
     ----------
     jobs : iterable of (key, callable or None)
     submit : callable
-        Gives a job away, for a future.
+        Submits a job; returns a future.
     first_ones : callable
-        Waits for some of the futures it is given to end; those that did, at least one.
+        Waits for some of the given futures; returns those that finished, at least one.
     n_most : callable
-        How many may be under way.
+        How many may be in progress.
 
     Yields
     ------
@@ -174,7 +175,7 @@ def _first_ones(futures: Iterable) -> Iterable:
 
 
 class _Threads(ThreadPoolExecutor):
-    """Threads; what is under way is waited for at the end, what is not is dropped."""
+    """Threads; at the end, running jobs are awaited and the others dropped."""
 
     def __exit__(self, *_: object) -> None:
         self.shutdown(cancel_futures=True)
@@ -184,8 +185,8 @@ class Processes(ProcessPoolExecutor):
     """Processes with one thread each: more threads than processors only wait for each other.
 
     Each starts as a fresh interpreter, since Open3D's threads do not survive a fork; the linear algebra
-    library reads its number of threads when it is loaded. They end at once when this end of a pipe closes,
-    which it does at an error here, a stop from the keyboard, and however this process dies.
+    library reads its number of threads when it is loaded. They end at once when this end of a pipe closes: at
+    an error here, at a keyboard interrupt, and whenever this process dies.
     """
 
     def __init__(self, n: int) -> None:
@@ -195,7 +196,7 @@ class Processes(ProcessPoolExecutor):
             super().__init__(n, context, begin, (self._theirs,))
 
     def submit(self, *arguments: Any, **named: Any) -> Any:
-        """As any executor's; it may start a process."""
+        """As for any executor; it may start a process."""
         with safe_start():
             return super().submit(*arguments, **named)
 
@@ -212,9 +213,10 @@ _opencv_lock, _n_threads_before = threading.Lock(), list[int]()
 
 @contextmanager
 def single_threaded_opencv() -> Iterator[None]:
-    """Hold OpenCV to one thread for a block: the jobs are what is spread.
+    """Limit OpenCV to one thread in a block, since jobs already run in parallel.
 
-    The number is the whole process's: of several who want it, the last to leave restores what the first met.
+    The setting is global to the process: of several overlapping blocks, the last to end restores the original
+    value.
     """
     with _opencv_lock:
         _n_threads_before.append(cv2.getNumThreads())

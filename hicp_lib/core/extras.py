@@ -1,4 +1,4 @@
-"""Parts that are installed by choice: where one is missing, one line says which extra brings it."""
+"""Optional parts: if one is missing, one line says which extra installs it."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +13,7 @@ class MissingPartError(InputError, ImportError):
 
 @contextmanager
 def needs(extra: str) -> Iterator[None]:
-    """Around imports: a package that is not installed is told with the extra that brings it.
+    """Around imports: if a package is missing, the error names the extra that installs it.
 
     Raises
     ------
@@ -27,7 +27,7 @@ def needs(extra: str) -> Iterator[None]:
 
 
 def require(extra: str, *modules: str) -> None:
-    """At the head of a package: refuse early, without the time that importing `modules` takes.
+    """At the top of a package: fail early, without importing `modules`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Files: the cache folder, hashes, writes that are whole or absent, JSON read at the door."""
+"""Files: the cache folder, hashes, atomic writes, checked reading of JSON."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def atomic_path(path: str | Path, sync: bool = True) -> Iterator[Path]:
     Parameters
     ----------
     path : str or Path
-        Nothing, or a regular file that may be written. Of a link its target is replaced; the link stays.
+        Nothing, or a regular file that may be written. For a link, its target is replaced and the link kept.
     sync : bool, optional
-        False where the content is checked when it is taken up: a power cut may leave it empty.
+        False if the content is checked when it is read: a power cut may leave it empty.
 
     Yields
     ------
@@ -71,7 +71,7 @@ def atomic_path(path: str | Path, sync: bool = True) -> Iterator[Path]:
                 os.fsync(file.fileno())
         os.replace(temporary, path)
     except OSError as error:
-        if str(error.filename) in ("None", str(temporary)):  # tell the name that was asked for
+        if str(error.filename) in ("None", str(temporary)):  # report the name that was given
             error.filename = str(named)
         raise
     finally:
@@ -94,7 +94,7 @@ def write_bytes(path: str | Path, content: bytes, sync: bool = True) -> None:
 
 
 def write_checked(path: str | Path, payload: bytes) -> None:
-    """Write `payload` after its SHA-256, so that `read_checked` knows it again; whole or not at all."""
+    """Write `payload` after its SHA-256, for `read_checked` to verify; whole or not at all."""
     write_bytes(path, hashlib.sha256(payload).digest() + payload, sync=False)
 
 
@@ -118,7 +118,7 @@ def read_checked(path: str | Path) -> bytes | None:
 
 
 def regular_file(path: str | Path, expected: str, max_bytes: float = math.inf) -> Path:
-    """The path, if it is that of a regular file: what else there is may never end, or never begin.
+    """The path, if it is a regular file: reading anything else may never start or never end.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def _kind(mode: int) -> str:
 
 
 def read_bytes(path: str | Path, expected: str) -> bytes:
-    """The content of a file that was named: the door for all that is read whole.
+    """The content of a file; used for everything that is read whole.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def write_table(path: str | Path, table: DataFrame) -> None:
 
 
 def natural_order(name: str) -> tuple[str, str]:
-    """What names are sorted by so that the numbers in them (up to 20 digits) are in their order.
+    """Sort key of names that orders the numbers in them (up to 20 digits) by value.
 
     Examples
     --------
@@ -220,7 +220,7 @@ def natural_order(name: str) -> tuple[str, str]:
 
 
 def json_or_text(text: str) -> Any:
-    """What a text says as JSON (true, 1, 0.5, [1, 2]), or else the text.
+    """The value of a text as JSON (true, 1, 0.5, [1, 2]), or else the text itself.
 
     Examples
     --------
@@ -244,7 +244,7 @@ def read_json(path: str | Path) -> Any:
     Returns
     -------
     Any
-        NaN and infinity, which JSON has not, are as Python writes them; whole numbers beyond 64 bits are
+        NaN and infinity, which JSON lacks, are read as Python writes them; integers beyond 64 bits become
         floats.
 
     Raises
@@ -253,7 +253,7 @@ def read_json(path: str | Path) -> Any:
         If the file is missing, unreadable or not JSON; the line and column are named.
     """
     content = read_bytes(path, "give the path of a JSON file")
-    with suppress(orjson.JSONDecodeError):  # json knows more than JSON, and says better what is amiss
+    with suppress(orjson.JSONDecodeError):  # json accepts more, with better messages
         return orjson.loads(content)
     try:
         return json.loads(content)

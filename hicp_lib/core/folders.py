@@ -1,4 +1,4 @@
-"""Folders: what is in them, and commands that fill them, one at a time and without others' files."""
+"""Folders: listing them, and locking those that a command fills."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import cache_dir, natural_order, read_json
 from hicp_lib.core.names import is_inside
 
-_OLD_S = 3600.0  # a temporary file that nobody wrote to for so long was left behind
+_OLD_S = 3600.0  # a temporary file not written to for this long is a leftover
 
 
 def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "", what: str = "a folder") -> list[str]:
-    """Names in a folder, the numbers in them in their order, without hidden ones.
+    """Names in a folder in natural order (numbers by value), without hidden ones.
 
     Parameters
     ----------
     folder : str or Path
     suffixes : str or tuple of str, optional
-        In lower case; names that end otherwise are left out.
+        In lower case; names with other endings are left out.
     what : str, optional
         Which folder to give, for the message.
 
@@ -44,13 +44,13 @@ def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "", what: str =
 
 
 def kept_beside(folder: Path, name: str, **kinds: type) -> dict[str, Any]:
-    """What a command kept about the files it made in a folder; empty values where the folder is empty.
+    """A command's own record of the files it made in a folder; empty values if the folder is empty.
 
     Parameters
     ----------
     folder : Path
     name : str
-        Of the file of JSON in it that holds this.
+        Of the JSON file with the record.
     **kinds : type
         Of the values.
 
@@ -74,7 +74,7 @@ def kept_beside(folder: Path, name: str, **kinds: type) -> dict[str, Any]:
 
 
 def remove_inside(folder: Path, names: Iterable[str]) -> None:
-    """Remove files that a list found in a folder calls its own; names that lead out of it are passed over."""
+    """Remove files that a folder's list names; names that lead out of the folder are ignored."""
     for name in names:
         if is_inside(name):
             (folder / name).unlink(missing_ok=True)
@@ -82,15 +82,15 @@ def remove_inside(folder: Path, names: Iterable[str]) -> None:
 
 @contextmanager
 def locked_folder(folder: str | Path) -> Iterator[None]:
-    """Let one process at a time fill a folder, which is made if it is not there.
+    """Let one process at a time fill a folder, which is created if missing.
 
-    The folder itself is locked, and the system frees it however the process ends; nothing is locked where the
-    system has no such locks. What was left half-written there an hour ago or earlier is removed.
+    The folder itself is locked, and the system releases the lock when the process ends; on systems without
+    such locks nothing is locked. Half-written files older than an hour are removed.
 
     Parameters
     ----------
     folder : str or Path
-        One in the cache is waited for: whoever fills it makes the same.
+        For a folder in the cache, the lock is awaited: the other process makes the same files.
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""Images in and out: RGB, 8 bit, as arrays.
+"""Reading and writing images: RGB, 8 bit, as arrays.
 
-A camera may store a picture turned, with a flag that tells viewers how to turn it back (EXIF's orientation,
-1 to 8). Pixels are always read as they are stored, and keypoints found or labelled are in that frame;
-whoever reads pictures of others asks for the flag and says so (`rotation_note`), or turns them (`as_seen`).
-TIFF alone is turned as it is read, by OpenCV and by every viewer, and counts as without a flag.
+A camera may store a picture rotated, with a flag that tells viewers how to rotate it back (EXIF's
+orientation, 1 to 8). Pixels are always read as stored, and keypoints are in that frame. Code that reads
+external images checks the flag and reports it (`rotation_note`), or rotates the image (`as_seen`). Only TIFF
+is rotated on reading, by OpenCV and by every viewer, and counts as having no flag.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ from hicp_lib.core.files import read_bytes, regular_file, write_bytes
 from hicp_lib.core.limited import LIMITS_VARIABLE, raised
 
 MAX_PIXELS = 100e6
-"""Of an image; more would be a gigabyte before anything looks at them."""
+"""Of an image; more would take a gigabyte before any processing."""
 _MAX_SCANS = 15
 _FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "JPEG2000", "PPM")  # as Pillow calls them
 Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom exclusive
@@ -49,12 +49,12 @@ def read_image(path: str | Path) -> np.ndarray:
 
 
 def decode_image(content: bytes | np.ndarray, path: str | Path) -> np.ndarray:
-    """An image out of a file's content, as `read_image` does; `path` is for the error's message."""
+    """Decode an image from a file's content, as `read_image` does; `path` is for the error message."""
     return decode(content, path, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
 
 
 def decode(content: bytes | np.ndarray, path: str | Path, flags: int) -> np.ndarray:
-    """Pixels out of a file's content, which is looked at before memory is taken for them.
+    """Decode pixels from a file's content, after checking its header for their number.
 
     Parameters
     ----------
@@ -72,11 +72,11 @@ def decode(content: bytes | np.ndarray, path: str | Path, flags: int) -> np.ndar
     Raises
     ------
     InputError
-        If it is no image that can be decoded, or has more than `MAX_PIXELS`.
+        If it cannot be decoded, or has more than `MAX_PIXELS`.
     """
     content = bytes(content)
     width_px, height_px, _ = image_header(BytesIO(content))
-    # Each scan of a JPEG costs as much as decoding it anew; those that are written have ten.
+    # Each scan of a progressive JPEG costs as much as one decoding; normal files have about ten.
     refuse_too_large(path, width_px, height_px * max(1, content.count(b"\xff\xda") // _MAX_SCANS))
     pixels = None
     with suppress(cv2.error):
@@ -87,7 +87,7 @@ def decode(content: bytes | np.ndarray, path: str | Path, flags: int) -> np.ndar
 
 
 def refuse_too_large(path: str | Path, width_px: int, height_px: int) -> None:
-    """Tell an image, or a frame of a video, of more pixels than are decoded.
+    """Raise an error for an image or video frame with too many pixels.
 
     Parameters
     ----------
@@ -124,21 +124,21 @@ def image_header(path: str | Path | BytesIO) -> tuple[int, int, int]:
     width_px, height_px : int
         0 where the file is no image that can be read.
     flag : int
-        2 to 8 for pictures that viewers turn (see `as_seen`), 1 for all others.
+        2 to 8 for pictures that viewers rotate (see `as_seen`), 1 for all others.
     """
     try:
         with path if isinstance(path, BytesIO) else open(regular_file(path, ""), "rb") as file:
             Image.init()
             start, readers = file.read(16), (Image.OPEN[kind] for kind in _FORMATS)
             file.seek(0)
-            # Pillow's own `open` would warn of large pictures, on its own account.
+            # Pillow's own `open` would print a warning about large images.
             image = next(read for read, accepts in readers if accepts and accepts(start))(file, "")
             exif = Image.Exif()
-            # A TIFF has nothing there, as it should; `getexif` would decode a PNG to its end.
+            # A TIFF has no flag there, as intended; `getexif` would decode a whole PNG.
             exif.load(image.info.get("exif", b""))
             flag = int(exif.get(ExifTags.Base.Orientation, 1))
             return *image.size, flag if flag in range(2, 9) else 1
-    except Exception:  # Pillow raises many kinds; whoever reads the pixels tells what is wrong with them
+    except Exception:  # Pillow raises many kinds; reading the pixels will report what is wrong
         return 0, 0, 1
 
 
@@ -155,7 +155,7 @@ def as_seen(pixels: np.ndarray, flag: int) -> np.ndarray:
     Returns
     -------
     array
-        Height and width change places for flags above 4.
+        Height and width are swapped for flags above 4.
 
     Examples
     --------
@@ -168,7 +168,7 @@ def as_seen(pixels: np.ndarray, flag: int) -> np.ndarray:
 
 
 def note_rotation(content: bytes, name: str, flagged: dict[str, int]) -> None:
-    """Add a picture to those with a rotation flag, if it has one; others are not even opened.
+    """Add an image to those with a rotation flag, if it has one; formats without EXIF are not opened.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def note_rotation(content: bytes, name: str, flagged: dict[str, int]) -> None:
 
 
 def rotation_note(flagged: Mapping[str, int]) -> str:
-    """One line that names pictures with a rotation flag; empty where there is none."""
+    """One line that names images with a rotation flag; empty if there are none."""
     about = "they are taken as stored in the file, not as viewers show them, and keypoints are in that frame"
     first = [f"{Path(name).name}: {flag}" for name, flag in flagged.items()][:1]
     return f"{len(flagged)} images have a rotation flag (EXIF; {first[0]}, ...): {about}" if first else ""
@@ -213,7 +213,7 @@ def inside(pixels_px: np.ndarray, box_px: Box) -> np.ndarray:
     Parameters
     ----------
     pixels_px : array, shape (..., 2)
-        (u, v); NaN lies nowhere.
+        (u, v); NaN is outside.
     box_px : tuple of int
         Left, top, right, bottom; right and bottom exclusive.
 

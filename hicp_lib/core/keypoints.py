@@ -41,7 +41,7 @@ HAND_LIMBS = [(a - 94, b - 94) for a, b in LIMBS if a in LEFT_HAND]
 SIGMAS: dict[str, np.ndarray] = {name: np.array(of) for name, of in _TABLES["oks_sigmas"].items()}
 
 # Maps onto Halpe-136: source index -> Halpe index, -1 where Halpe has no counterpart. "halpe68_noface" is
-# Halpe without its face, as AlphaPose has models for. MediaPipe's foot index approximates the big toe; neck
+# Halpe without its face; AlphaPose has models for it. MediaPipe's foot index approximates the big toe; neck
 # and mid-hip would only be mid-points there.
 TO_HALPE: dict[str, np.ndarray] = {
     name: np.array(indices) for name, indices in _TABLES["source_index_to_halpe"].items()
@@ -88,7 +88,7 @@ _HALPE_MIRROR = np.array(_TABLES["in_a_mirror"])
 def mirror(convention: str) -> np.ndarray:
     """For each keypoint, the one it becomes in a mirrored image: `values[..., mirror(c)]` swaps the sides.
 
-    Hands on their own map onto themselves: the mirror image of a left hand is a right hand's.
+    Conventions of a single hand map onto themselves: the mirror image of a left hand is a right hand.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""Readers of others' files in a process of their own, whose time and memory are limited.
+"""Run readers of external files in a separate process with limited time and memory.
 
-A damaged or hostile file can make a parser end its process, never end, or take all memory there is.
+A damaged or hostile file can make a parser crash its process, run forever, or use up all memory.
 """
 
 import json
@@ -23,9 +23,9 @@ _LEAST_S, _S_PER_BYTE, _MOST_S_PER_BYTE = 4.0, 1e-6, 1e-4  # of computing; the l
 _LEAST_BYTES, _BYTES_PER_BYTE = 800 * 2**20, 40  # of memory
 _PROGRAM = """import sys; at = [*("-packages" in folder for folder in sys.path), True].index(True)
 sys.path.insert(at, sys.argv[1]); from hicp_lib.core import limited; limited.serve()"""
-_patience_s: list[float] = []  # of a limited process: how long it may compute at one thing
+_patience_s: list[float] = []  # of a limited process: how long one step may compute
 RAISE = f"{LIMITS_VARIABLE}=4 in the environment allows four times as much"
-"""What a message about a limit ends with."""
+"""The end of a message about a limit."""
 
 
 def raised(limit: float) -> float:
@@ -34,7 +34,7 @@ def raised(limit: float) -> float:
     Raises
     ------
     InputError
-        If that is no number above 0.
+        If that is not a number above 0.
 
     Examples
     --------
@@ -45,20 +45,20 @@ def raised(limit: float) -> float:
     with suppress(ValueError):
         if 0 < float(text) < 1e6:
             return limit * float(text)
-    raise InputError(f"{LIMITS_VARIABLE} is {text!r}; expected what limits are multiplied by, such as 4")
+    raise InputError(f"{LIMITS_VARIABLE} is {text!r}; expected the factor for all limits, such as 4")
 
 
 def limited_child(path: Path, function: Callable, *arguments: Any) -> Any:
-    """What a function answers in a process of its own, which ends with it.
+    """The result of a function that runs in a separate, limited process.
 
     Parameters
     ----------
     path : Path
-        What it reads, a file or a folder of them; its size says how much time and memory it may take.
+        The file or folder of files that it reads; its size determines the time and memory allowed.
     function : callable
-        Of a module; takes the path as text, and `arguments`.
+        A module's function; takes the path as text, and `arguments`.
     *arguments : object
-        JSON-able, as what it returns.
+        JSON-able, like its result.
 
     Returns
     -------
@@ -67,11 +67,11 @@ def limited_child(path: Path, function: Callable, *arguments: Any) -> Any:
     Raises
     ------
     InputError
-        Its own, or if it takes too long or too much memory, or its process ends.
+        Raised by the function, or if it takes too long or too much memory, or its process ends.
     """
     files = [path] if path.is_file() else [file for file in path.glob("*") if not file.is_dir()]
     if not files or not all(map(Path.is_file, files)):
-        raise InputError(f"{path}: is no file and no folder of files; check the path")
+        raise InputError(f"{path}: is neither a file nor a folder of files; check the path")
     n_bytes = sum(file.stat().st_size for file in files)
     limits = [raised(_LEAST_S + per_byte * n_bytes) for per_byte in (_S_PER_BYTE, _MOST_S_PER_BYTE)]
     limits.append(raised(_LEAST_BYTES + _BYTES_PER_BYTE * n_bytes))
@@ -96,16 +96,16 @@ def limited_child(path: Path, function: Callable, *arguments: Any) -> Any:
 
 
 def serve() -> None:
-    """Answer the question of the caller on standard output: the program of the process."""
+    """Main program of the process: run the function, write its result to standard output."""
     end_with(0)
     answers = os.dup(1)
-    os.dup2(2, 1)  # what a library prints is no answer
+    os.dup2(2, 1)  # output printed by libraries must not mix with the result
     module, name, arguments, limits = json.loads(Path(os.environ["TMPDIR"], "question").read_text())
     function = getattr(import_module(module), name)
     with suppress(ImportError, ValueError, OSError):  # no such limits on this system
         import resource
 
-        # Beside what importing took: libraries set memory aside that they do not use.
+        # In addition to what imports took: libraries reserve memory that they do not use.
         limits[2] += int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
         for name, most in {"CPU": limits[1] + 4, "DATA": limits[2], "FSIZE": limits[2], "CORE": 0}.items():
             resource.setrlimit(getattr(resource, f"RLIMIT_{name}"), (int(most), int(most) + 1))
@@ -120,6 +120,6 @@ def serve() -> None:
 
 
 def went_on() -> None:
-    """Say from within a limited process that a part of the work is done: the rest gets time anew."""
+    """Called in a limited process after a part of the work: restarts the time limit."""
     for limit_s in _patience_s:
         signal.setitimer(signal.ITIMER_PROF, limit_s)

@@ -1,4 +1,4 @@
-"""What is made once in a process and kept: it follows from its key alone, and nobody can change it."""
+"""Results cached within a process: they depend on their key only, and are read-only."""
 
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
@@ -11,11 +11,11 @@ _Function = TypeVar("_Function", bound=Callable)
 
 
 def memoised(maxsize: int | None = None) -> Callable[[_Function], _Function]:
-    """As `functools.lru_cache`, but what one caller gave or does never shows in what the next one gets.
+    """As `functools.lru_cache`, but what one caller passes or does never affects another's result.
 
     Numbers of NumPy become Python's: ``0.06`` and ``np.float64(0.06)`` are one key, but arrays of single
     precision stay so with the first only. For the same reason ``-0.0`` becomes ``0.0``, and ``1``, ``1.0``
-    and ``True`` are keys of their own. A dataclass that is a key sees to its own fields (`plain_fields`).
+    and ``True`` are different keys. A dataclass used as a key must convert its own fields (`plain_fields`).
     Arrays in the result, also within dataclasses, are read-only.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Names of files that come from others' files."""
+"""Checks of file names that come from external files."""
 
 import re
 from pathlib import PureWindowsPath

@@ -11,12 +11,12 @@ _EPS = np.spacing(1)
 
 
 def oks_terms(offsets_px: np.ndarray, areas_px2: np.ndarray, sigmas: np.ndarray) -> np.ndarray:
-    """What each keypoint contributes to OKS.
+    """The contribution of each keypoint to OKS.
 
     Parameters
     ----------
     offsets_px : array, shape (..., k, 2)
-        From the truth to what was found.
+        From the true to the detected position.
     areas_px2 : array, shape (...)
         The s² of each person.
     sigmas : array, shape (k,)

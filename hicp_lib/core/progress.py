@@ -1,4 +1,4 @@
-"""A bar for what takes longer than two seconds; on a terminal only."""
+"""A progress bar for loops longer than two seconds; on a terminal only."""
 
 from collections.abc import Iterable
 from typing import TypeVar
@@ -9,7 +9,7 @@ _Item = TypeVar("_Item")
 
 
 def with_bar(items: Iterable[_Item], what: str, unit: str = "it") -> Iterable[_Item]:
-    """The same items, with a bar on standard error while they are gone through.
+    """Iterate over items, with a progress bar on standard error.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ def rotations_from_vectors(vectors: np.ndarray) -> np.ndarray:
 
 def rotation(vector: Iterable[float]) -> np.ndarray:
     """Rotation matrix (3, 3) of one rotation vector (3,) in radians."""
-    # Written out: poses are made of thousands of single rotations, and arrays of three are slow.
+    # Written out, since a pose needs thousands of single rotations, and arrays of three are slow.
     x, y, z = map(float, vector)
     angle = sqrt(x * x + y * y + z * z)
     if angle == 0:

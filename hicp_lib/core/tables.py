@@ -1,4 +1,4 @@
-"""Tables of others: CSV and Parquet, of which columns are asked for by name."""
+"""External tables: CSV and Parquet, with columns selected by name."""
 
 from collections.abc import Sequence
 from io import BytesIO
@@ -17,7 +17,7 @@ _CELLS, _CELLS_PER_BYTE = 5e6, 20  # a file of a megabyte can stand for billions
 
 
 def read_table(path: str | Path, columns: Sequence[str], **options: Any) -> pd.DataFrame:
-    """Read a table that has some columns once each: Parquet where the name ends so, else CSV.
+    """Read a table in which some columns must occur exactly once: Parquet by its suffix, else CSV.
 
     Parameters
     ----------
@@ -33,7 +33,8 @@ def read_table(path: str | Path, columns: Sequence[str], **options: Any) -> pd.D
     Raises
     ------
     InputError
-        If it cannot be read, a column is missing or there twice, or it is too large for its file.
+        If it cannot be read, a column is missing or duplicated, or the table is implausibly large for its
+        file.
     """
     expected = f"expected a table with {', '.join(columns)}"
     content = read_bytes(path, expected)

@@ -1,4 +1,4 @@
-"""Videos in: one frame after the other."""
+"""Reading videos frame by frame."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +14,7 @@ SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".webm")
 
 
 def open_video(path: str | Path) -> tuple[int, Iterator[tuple[float, np.ndarray]]]:
-    """The frames of a video, turned as players show them.
+    """The frames of a video, rotated as players show them.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def open_video(path: str | Path) -> tuple[int, Iterator[tuple[float, np.ndarray]
     Returns
     -------
     n_frames : int
-        How many it says it has; 0 if it does not say.
+        Number of frames according to the file; 0 if unknown.
     frames : iterator of (float, array of shape (height, width, 3))
         Time in seconds, as the file gives it, and the image, RGB, uint8.
 
@@ -34,7 +34,7 @@ def open_video(path: str | Path) -> tuple[int, Iterator[tuple[float, np.ndarray]
     """
     capture = cv2.VideoCapture(str(regular_file(path, "give a video")))
     if not capture.isOpened():
-        raise InputError(f"{path}: is no video that OpenCV can read; give .mp4, .avi or .mov, or images")
+        raise InputError(f"{path}: is not a video that OpenCV can read; give .mp4, .avi or .mov, or images")
 
     sides_px = [int(capture.get(of)) for of in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)]
     refuse_too_large(path, *sides_px)

@@ -1,13 +1,13 @@
-"""Close: a third subset beside HiCP's Basic and Headless, of single parts of people.
+"""Close: a third subset in addition to HiCP's Basic and Headless, with single parts of people.
 
-A robot within reach of a person sees a head, an arm or two legs alone, which hardly any crop of a whole
-person shows. This subset is not the paper's. It is cut from the crops of Basic by rule: around the labelled
-keypoints of one part, grown by a margin. A crop is taken when it has at least `min_pixels` pixels and its
-annotations say that it is of the class aimed at (`evaluation.visibility_classes`); of every class, the first
-`n_per_class` people. No detector has a say in it.
+A robot within reach of a person sees only a head, an arm or two legs, which crops of whole people rarely
+show. This subset is not in the paper. It is cut from the crops of Basic by rule: around the labelled
+keypoints of one part, with a margin. A crop is kept if it has at least `min_pixels` pixels and its
+annotations belong to the intended class (`hicp_lib.datasets.visibility`); of every class, the first
+`n_per_class` people. No detector influences this selection.
 
-Arms and legs of rendered people or of COCO's are small: with Basic's least size hardly any would be left.
-So the crops are smaller than Basic's, and resolution differs along with the class.
+Arms and legs of rendered people and of people in COCO are small: with Basic's minimum size hardly any would
+remain. So the crops are smaller than Basic's, and resolution differs between classes.
 """
 
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ from hicp_lib.datasets.crops import crop_people, image_name, n_pixels, whole_pix
 from hicp_lib.datasets.visibility import visibility_class
 from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
 
-MARGIN = 0.1  # of the larger side of the keypoints' extent, added on every side
+MARGIN = 0.1  # fraction of the larger side of the keypoints' extent, added on every side
 
 
 def _named(*names: str) -> np.ndarray:
@@ -34,7 +34,7 @@ def _named(*names: str) -> np.ndarray:
 
 _LEFT = np.r_[_named("left_elbow", "left_wrist"), LEFT_HAND]
 _RIGHT = np.r_[_named("right_elbow", "right_wrist"), RIGHT_HAND]
-# Class aimed at: keypoints that the crop is cut around.
+# Intended class: keypoints around which the crop is cut.
 AIMS: dict[str, np.ndarray] = {
     "only head": HEAD,
     "only left arm": _LEFT,
@@ -46,16 +46,16 @@ AIMS: dict[str, np.ndarray] = {
 
 
 def open_close(basic: Path, n_per_class: int = 30, min_pixels: int = 5_000) -> Path:
-    """The dataset folder of Close for a folder of Basic; made in the cache if it is not there.
+    """The dataset folder of Close for a folder of Basic; made in the cache if it does not exist.
 
     Parameters
     ----------
     basic : Path
         Dataset folder (`images/`, `annotations.json`) that `create_hicp` wrote.
     n_per_class : int, optional
-        Most crops per class.
+        Maximum number of crops per class.
     min_pixels : int, optional
-        Least size of a crop.
+        Minimum size of a crop.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def open_close(basic: Path, n_per_class: int = 30, min_pixels: int = 5_000) -> P
 
 
 def _crops_of(source: Annotations, aim: str, min_pixels: int) -> Iterator[tuple[int, Box, Annotations]]:
-    """The crops that show what is aimed at: image id in Basic, box, people, whoever counts first."""
+    """The crops of the intended class: image id in Basic, box, people (the evaluated one first)."""
     for image_id, image in source.images.items():
         people = source.take(source.image_ids == image_id)
         people = people.take(np.argsort(people.is_crowd, kind="stable"))
@@ -88,7 +88,7 @@ def _crops_of(source: Annotations, aim: str, min_pixels: int) -> Iterator[tuple[
 
 
 def _box_around(people: Annotations, keypoints: np.ndarray, image: ImageInfo) -> Box | None:
-    """The grown extent of the first person's labelled keypoints, in whole pixels of the image."""
+    """The extent of the first person's labelled keypoints with a margin, in whole pixels of the image."""
     points = people.keypoints_px[0, keypoints[people.visibility[0, keypoints] > 0]]
     if len(points) < 2:
         return None
@@ -101,7 +101,7 @@ def _box_around(people: Annotations, keypoints: np.ndarray, image: ImageInfo) ->
 
 
 def _joined(source: Annotations, parts: list[tuple[int, Box, Annotations]]) -> Annotations:
-    """The crops as one data set; image ids count from 1, and people say where they come from."""
+    """The crops as one data set; image ids count from 1, and people have keys for their source."""
     own = source.take(~source.is_other)
     origins = dict(zip(own.image_ids.tolist(), own.extras, strict=True))
     images, pieces = {}, []

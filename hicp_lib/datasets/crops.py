@@ -1,14 +1,14 @@
-"""The geometry of HiCP: which crop of an image shows a person close by.
+"""The geometry of HiCP's crops.
 
-After Docekal et al. 2022, section III-A. The paper fixes that people are cropped by their
-boxes, and that crops of at least 20,000 pixels are kept. The rest is chosen here:
+After Docekal et al. 2022, section III-A. The paper says that people are cropped by their boxes, and that
+crops of at least 20,000 pixels are kept. The rest was chosen here:
 
-- A box is rounded outwards to whole pixels and clipped to the image. Keypoint u lies in pixel
-  column i when i - 0.5 <= u < i + 0.5; keypoints outside the crop are no longer labelled. Boxes end at
-  pixels' edges, and tools that draw them around keypoints count those from there, too: a crop grows by a
-  pixel where a keypoint in its person's box, or on its edge, would be lost, and a keypoint between the
-  image's last pixels and its edge is moved onto them.
-- The segment's area shrinks in proportion to the part of the box that remains.
+- A box is rounded outwards to whole pixels and clipped to the image. Keypoint u lies in pixel column i when i
+  - 0.5 <= u < i + 0.5; keypoints outside the crop are no longer labelled. Boxes end at the edges of pixels,
+  and tools that draw boxes around keypoints measure those from the edges, too. So a crop is enlarged by a
+  pixel if a keypoint in its person's box, or on its edge, would be lost, and a keypoint between the image's
+  last pixel centres and its edge is moved onto these pixels.
+- The segment's area is reduced in proportion to the part of the box that remains.
 """
 
 from dataclasses import replace
@@ -19,7 +19,7 @@ from hicp_lib.core.images import Box, inside
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.formats.cropcoco import OUTSIDE
 
-_EDGE_PX = 0.5  # as far as rounding may put a keypoint outside the box that was drawn around it
+_EDGE_PX = 0.5  # how far rounding may put a keypoint outside the box drawn around it
 
 
 def whole_pixel_boxes(boxes_px: np.ndarray, widths_px: np.ndarray, heights_px: np.ndarray) -> np.ndarray:
@@ -64,7 +64,7 @@ def image_sizes(annotations: Annotations) -> np.ndarray:
 
 
 def person_crops(annotations: Annotations) -> tuple[np.ndarray, np.ndarray]:
-    """The crop of everybody: the pixels of the box, and of labelled keypoints within it or on its edge.
+    """The crop of each person: the pixels of the box, and of labelled keypoints within it or on its edge.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def crop_people(annotations: Annotations, rows: np.ndarray, crop_px: Box) -> Ann
     Parameters
     ----------
     annotations : Annotations
-        What is annotated.
+        The annotated people.
     rows : array of int
         The people, of one image.
     crop_px : tuple of int
@@ -117,8 +117,8 @@ def crop_people(annotations: Annotations, rows: np.ndarray, crop_px: Box) -> Ann
     Returns
     -------
     Annotations
-        Without people whose box does not reach into the crop. `images` and `image_ids` stay the source's: the
-        caller names the crop.
+        Without people whose box does not overlap the crop. `images` and `image_ids` remain those of the
+        source: the caller names the crop.
     """
     people = annotations.take(rows)
     image = annotations.images[int(people.image_ids[0])]
@@ -138,20 +138,20 @@ def crop_people(annotations: Annotations, rows: np.ndarray, crop_px: Box) -> Ann
 
 
 def with_outside(people: Annotations, source: Annotations) -> Annotations:
-    """People of crops, with what the images they were cut from know of keypoints outside the crops.
+    """Add to people in crops the keypoints outside, known from the images they were cut from.
 
     Parameters
     ----------
     people : Annotations
-        Of crops; those who count name their `source_id` and `crop_px`.
+        Of crops; evaluated people have `source_id` and `crop_px`.
     source : Annotations
-        What the crops were made from.
+        The annotations that the crops were made from.
 
     Returns
     -------
     Annotations
-        The same people; keypoints that are labelled in the source only have a place, outside the picture,
-        and the flag `OUTSIDE`.
+        The same people; keypoints that are labelled only in the source get their position, outside the
+        picture, and the flag `OUTSIDE`.
     """
     row_of = {int(i): row for row, i in enumerate(source.ids)}
     rows = [i for i, about in enumerate(people.extras) if "crop_px" in about]
@@ -173,5 +173,5 @@ def clip_boxes(boxes_px: np.ndarray, limits_px: Box) -> np.ndarray:
 
 
 def image_name(number: int) -> str:
-    """Of a crop's image, by its image id."""
+    """File name of a crop, by its image id."""
     return f"{number:012d}.png"

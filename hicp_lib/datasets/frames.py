@@ -1,8 +1,8 @@
-"""Whether annotations and pictures are in one frame: rotation flags, and labels outside their image.
+"""Check that annotations and images use the same orientation: rotation flags, and labels outside their image.
 
-A tool that annotates may show a picture as it is stored or turned as its rotation flag says (EXIF), and
-write either size; what it wrote cannot be told from the file with certainty. So pictures with a flag are
-refused until somebody says which it was.
+An annotation tool may show an image as stored or rotated by its EXIF flag, and write either size; which of
+these it did cannot be determined reliably from its file. So images with a flag are refused until the user
+says which it was.
 """
 
 from dataclasses import replace
@@ -20,28 +20,28 @@ from hicp_lib.formats.units import beyond
 def in_frame(
     annotations: Annotations, images_dir: Path, orientation: str | None
 ) -> tuple[Annotations, dict[str, int]]:
-    """Annotations with the images' sizes in the frame that is asked for.
+    """Annotations with the images' sizes in the requested orientation.
 
     Parameters
     ----------
     annotations : Annotations
         The people.
     images_dir : Path
-        Folder of the annotated images; those that are missing are passed over.
+        Folder of the annotated images; missing ones are skipped.
     orientation : {"stored", "seen"} or None
-        What was annotated: the pixels as they lie in the file, or turned as viewers show them.
+        What was annotated: the pixels as stored, or rotated as viewers show them.
 
     Returns
     -------
     annotations : Annotations
-        Sizes as seen where they were as stored and the pictures are to be turned.
+        Sizes as seen, if they were as stored and the images are to be rotated.
     flags : dict of str to int
-        File name -> rotation flag (2 to 8) of the pictures that have one.
+        File name -> rotation flag (2 to 8) of the images that have one.
 
     Raises
     ------
     InputError
-        If a picture has a flag and nothing is asked for, or its annotated size is not that of the frame.
+        If an image has a flag and no orientation is given, or its annotated size does not match.
     """
     images, flags = dict(annotations.images), {}
     for i in np.unique(annotations.image_ids).tolist():
@@ -55,8 +55,8 @@ def in_frame(
             sizes = "{}x{} as stored, {}x{} as viewers show it, annotated as {}x{}"
             raise InputError(
                 f"{path}: has a rotation flag ({flag}), {sizes.format(*stored, *seen, *annotated)}; say what "
-                "was annotated: --orientation seen (the picture as viewers show it; it is turned) or stored "
-                "(the pixels as they lie in the file), or save the picture turned, without the flag"
+                "was annotated: --orientation seen (the picture as viewers show it; it is rotated) or stored "
+                "(the pixels as in the file), or save the picture rotated, without the flag"
             )
         if orientation == "seen":
             images[i] = replace(images[i], width_px=seen[0], height_px=seen[1])
@@ -69,8 +69,8 @@ def outside_image(annotations: Annotations) -> dict[str, int]:
     Returns
     -------
     dict of str to int
-        Labelled `keypoints` more than a pixel outside, `boxes` of which less than half is inside, and the
-        `people` who have any.
+        Labelled `keypoints` more than a pixel outside, `boxes` with less than half inside, and the `people`
+        affected.
     """
     sizes, points = image_sizes(annotations), annotations.keypoints_px
     keypoints = beyond(points, 0, sizes[:, None]) & (annotations.visibility > 0)

@@ -1,13 +1,13 @@
-"""Where the head is cut off: after Docekal et al. 2022, section III-A, by the positions of head and body.
+"""Where to cut off the head, from the positions of head and body (Docekal et al. 2022, section III-A).
 
-The rest is chosen here:
+The rest was chosen here:
 
 - The head's position is the mean of its labelled keypoints (nose, eyes, ears, head top, face),
   the body's that of the other labelled body keypoints (hands do not count: 21 points on a
   raised hand would outweigh the trunk).
-- The head lies on that side of the body (above, below, left, right) in which it is displaced
-  most. The cut is the first pixel border towards the body that leaves every head keypoint on
-  the other side, and the end of the face, where the chin is not labelled (`face_end`).
+- The head's side is the direction (above, below, left, right) in which it is displaced most from the body.
+  The cut is the first pixel border towards the body with every head keypoint, and the end of the face if the
+  chin is not labelled (`face_end`), on the other side.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,8 @@ TRUNK = np.setdiff1d(BODY, HEAD)
 _MID_HEAD = np.arange(0, 5)  # nose, eyes, ears
 _TOP, _CHIN = INDEX["head_top"], INDEX["face_8"]
 _WAYS = {"neck": [INDEX["neck"]], "shoulders": [INDEX["left_shoulder"], INDEX["right_shoulder"]]}
-# How the end of a face was known, by falling trust; with the last a part of the face may stay in the picture.
+# How the end of a face was determined, by decreasing reliability; with the last rule a part of the face may
+# remain.
 CUT_RULES = ("chin labelled", "head top", *_WAYS, "head labels only")
 
 SIDES = ("left", "top", "right", "bottom")
@@ -29,7 +30,7 @@ SIDES = ("left", "top", "right", "bottom")
 
 @dataclass(frozen=True)
 class HeadCut:
-    """Where head and body are in a crop, and what remains without the head.
+    """Positions of head and body in a crop, and the part that remains without the head.
 
     Attributes
     ----------
@@ -51,7 +52,7 @@ class HeadCut:
 
 
 def headless_cut(keypoints_px: np.ndarray, visibility: np.ndarray, crop_px: Box) -> HeadCut | None:
-    """Find the cut that takes the head off a person.
+    """Find the cut that removes a person's head.
 
     Parameters
     ----------
@@ -65,8 +66,8 @@ def headless_cut(keypoints_px: np.ndarray, visibility: np.ndarray, crop_px: Box)
     Returns
     -------
     HeadCut or None
-        None when no head keypoint or no other body keypoint is labelled. Nothing may remain (an empty
-        `kept_px`) when the head reaches the far side of the crop.
+        None when no head keypoint or no other body keypoint is labelled. `kept_px` may be empty when the head
+        reaches the far side of the crop.
     """
     labelled = (visibility > 0) & inside(keypoints_px, crop_px)
     head, body = (keypoints_px[part[labelled[part]]] for part in (HEAD, TRUNK))
@@ -86,10 +87,10 @@ def headless_cut(keypoints_px: np.ndarray, visibility: np.ndarray, crop_px: Box)
 def face_end(
     along: np.ndarray, labelled: np.ndarray, known: np.ndarray, backwards: bool
 ) -> tuple[str, list[float]]:
-    """Where a face ends towards the body, as far as it is not labelled.
+    """The end of a face towards the body, estimated where the chin is not labelled.
 
-    With the head top, nose, eyes or ears: these lie half-way between top and chin. Otherwise a share of the
-    way to the neck, or between the shoulders, as measured on the development bodies.
+    With the head's top, and nose, eyes or ears: these lie half-way between top and chin. Otherwise a fraction
+    of the way to the neck, or to the middle of the shoulders, measured on development identities.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ def face_end(
     middle = [along[part[labelled[part]]].mean() for part in (_MID_HEAD, FACE) if labelled[part].any()][:1]
     if labelled[_TOP] and middle:
         return CUT_RULES[1], [2 * middle[0] - along[_TOP]]
-    # Of 599 pictures of development people, in poses as they are rendered, 97.5 % of the faces end before.
+    # In 599 rendered images of development identities, 97.5 % of the faces end before this.
     start, share = (middle[0], 0.75) if middle else (along[_TOP], 0.90)
     for rule, part in _WAYS.items():
         way = np.mean(along[part][known[part]]) - start if known[part].any() else 0.0

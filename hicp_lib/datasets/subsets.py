@@ -1,19 +1,18 @@
-"""HiCP: the Basic and Headless datasets of people close by, from any annotated images.
+"""HiCP: make the Basic and Headless datasets of people at close range from any annotated images.
 
-The rules are those of `hicp_lib.datasets.crops` and `hicp_lib.datasets.heads`; about people, where the paper
-is silent:
+The rules are those of `hicp_lib.datasets.crops` and `hicp_lib.datasets.heads`; where the paper leaves it
+open, people are treated so:
 
-- Crowds, and people of whom the crop shows no labelled keypoint, are left out of both.
-- People without a labelled head keypoint in the crop are not part of Headless: their head may be in
-  view all the same. Neither are those without any other body keypoint, or with too few
-  pixels left.
+- Crowds, and people without a labelled keypoint in the crop, are left out of both.
+- People without a labelled head keypoint in the crop are not part of Headless: their head may be visible
+  nevertheless. Neither are those without any other body keypoint, or with too few pixels left.
 - Other people reaching into a crop stay in its annotations with `iscrowd` 1 and `"other": true`,
-  so that finding them is no mistake.
-- How the end of the face was known, and who may still show a part of it, is kept with the Headless
+  so that detecting them is not a false positive.
+- How the end of the face was determined, and who may still show a part of it, is stored with Headless
   (`hicp_lib.datasets.heads.CUT_RULES`).
 
 A crop's image id, and its person's annotation id, are the person's annotation id in the source:
-the same person is found in both datasets, whatever the rules select.
+the same person has the same id in both datasets, independent of the selection.
 """
 
 from collections.abc import Iterable
@@ -40,31 +39,31 @@ from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotation
 
 SUBSETS = ("basic", "headless")
 _CENTRES = [f"{part}_{axis}_px" for part in ("head", "body") for axis in "uv"]
-_Crop = tuple[Path, Box]  # the file to write, and what of the image goes into it
+_Crop = tuple[Path, Box]  # the file to write, and its part of the image
 
 
 def plan(annotations: Annotations, min_pixels: int = 20_000, headless_min_pixels: int = 1) -> pd.DataFrame:
-    """Decide, for every annotated person, on the crops.
+    """Decide on the crops of every annotated person.
 
     Parameters
     ----------
     annotations : Annotations
         The people.
     min_pixels : int, optional
-        Least size of a Basic crop, by the box.
+        Minimum size of a Basic crop, by the box.
     headless_min_pixels : int, optional
-        Least size of a Headless crop. The paper's counts, 1624 and 1608, differ too little for its limit to
-        have been asked again after the cut.
+        Minimum size of a Headless crop. The paper's counts, 1624 and 1608, differ too little for the limit to
+        have been applied again after the cut.
 
     Returns
     -------
     DataFrame
-        One row per annotated person in the order of `annotations`: `annotation_id, image_id, file_name`; what
-        becomes of the person, `basic` and `headless`: "kept" or the reason why not; and in pixels of the
+        One row per annotated person in the order of `annotations`: `annotation_id, image_id, file_name`; the
+        outcome for the person, `basic` and `headless`: "kept" or the reason why not; and in pixels of the
         source image, NaN where undefined: `<box>_left_px, _top_px, _right_px, _bottom_px` for the boxes
         basic_crop, headless_crop (right and bottom exclusive), head and body (extent of the labelled
         keypoints), the centres `head_u_px, head_v_px, body_u_px, body_v_px`, `cut_side`, the side of the crop
-        that is removed, and `cut_rule`, how the end of the face was known.
+        that is removed, and `cut_rule`, how the end of the face was determined.
     """
     annotations = on_pixels(annotations)
     boxes, crops = person_crops(annotations)
@@ -157,9 +156,10 @@ def crop_annotations(annotations: Annotations, table: pd.DataFrame, subset: str)
 
 
 def summary(table: pd.DataFrame) -> dict:
-    """People per fate: `{"people": n, "basic": {"kept": n, reason: n, ...}, "headless": {...}}`.
+    """People kept and dropped: `{"people": n, "basic": {"kept": n, reason: n, ...}, "headless": {...}}`.
 
-    `"headless_cut_by"` has those of Headless per rule; with the last a part of the face may be in the crop.
+    `"headless_cut_by"` counts those in Headless per rule; with the last rule a part of the face may be in the
+    crop.
     """
     counts = {subset: table[subset].value_counts().to_dict() for subset in SUBSETS}
     cut_by = table.loc[table["headless"] == "kept", "cut_rule"].value_counts().to_dict()
@@ -169,7 +169,7 @@ def summary(table: pd.DataFrame) -> dict:
 
 
 def notes(counts: dict) -> list[str]:
-    """What a user must know of the counts of `create_hicp`, a line each."""
+    """Warnings about the result of `create_hicp`, a line each."""
     unsure = {"people": counts["headless_cut_by"][CUT_RULES[-1]]}
     lines = {
         "{keypoints} labelled keypoints and {boxes} boxes, of {people} people, lie outside their image; "
@@ -180,7 +180,7 @@ def notes(counts: dict) -> list[str]:
 
 
 def count_sensitivity(annotations: Annotations, min_pixels: int = 20_000) -> pd.DataFrame:
-    """How the choices the paper leaves open move the counts: columns `rule, basic, headless` (people)."""
+    """Counts under other choices that the paper leaves open: columns `rule, basic, headless` (people)."""
     rules: dict[str, dict[str, int]] = {
         f"as here: Basic at least {min_pixels} pixels, Headless of any size": {},
         f"both at least {min_pixels} pixels": {"headless_min_pixels": min_pixels},
@@ -209,8 +209,8 @@ def create_hicp(
 ) -> dict:
     """Write the dataset folders out/basic and out/headless, and out/summary.json.
 
-    Crops keep the original pixels (PNG). Interrupted, it goes on with the next call; crops of
-    other sources or rules are replaced.
+    Crops keep the original pixels (PNG). If interrupted, the next call continues; crops from other sources or
+    rules are replaced.
 
     Parameters
     ----------
@@ -238,8 +238,8 @@ def create_hicp(
     Raises
     ------
     InputError
-        For malformed annotations, missing or wrongly sized images, a rotation flag nobody decided on, or an
-        `out` that is being filled, holds what is read, or is in use for something else.
+        For malformed annotations, missing or wrongly sized images, a rotation flag without a given
+        orientation, or an `out` that is being filled, contains the input, or is in use for something else.
     """
     out, images_dir = Path(out), Path(images_dir)
     annotations, flags = in_frame(read_annotations(annotations_path, keypoint_map), images_dir, orientation)
@@ -266,7 +266,7 @@ def create_hicp(
 
 
 def _digest(table: pd.DataFrame, boxes: dict, images_dir: Path, turned: dict[str, int]) -> str:
-    """What the pixels of the crops depend on."""
+    """Digest of all that the pixels of the crops depend on."""
     names = sorted({table["file_name"].iloc[row] for kept in boxes.values() for row in kept})
     files = [(name, content(regular_file(images_dir / name, "give the images' folder"))) for name in names]
     ids = table["annotation_id"].tolist()
@@ -275,7 +275,7 @@ def _digest(table: pd.DataFrame, boxes: dict, images_dir: Path, turned: dict[str
 
 
 def _claim(out: Path, digest: str, crops: Iterable[_Crop]) -> None:
-    """Make `out` ours: crops of another digest are removed, what is a stranger's is refused."""
+    """Prepare `out`: crops with another digest are removed; other files are refused."""
     marker, names = out / "crops.json", ["summary.json", *(f"{name}/annotations.json" for name in SUBSETS)]
     before = kept_beside(out, marker.name, digest=str, names=list)
     names += [path.relative_to(out).as_posix() for path, _ in crops]

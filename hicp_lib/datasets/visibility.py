@@ -1,10 +1,10 @@
-"""Which parts of a person a picture shows: the classes of the paper's section IV-D, decided by rules.
+"""Which parts of a person an image shows: the classes of the paper's section IV-D, defined by rules.
 
-The paper names the classes without defining them; the rules here are ours. A part is in the picture when a
-keypoint of it is labelled there, visible or hidden behind something (what Halpe's flags say of that is not
-documented). An arm is an elbow or a wrist; a whole arm is both. "No head" asks for the trunk (shoulders and
-hips) beside both whole arms, and "both arms" for shoulders without hips, so that a person is of one class at
-most. Who fits no rule is of the class "none of these".
+The paper names the classes without defining them; the rules here are ours. A part is in the picture when one
+of its keypoints is labelled there, visible or occluded (Halpe does not document what its flags say about
+this). An arm is an elbow or a wrist; a whole arm is both. "No head" requires the trunk (shoulders and hips)
+and both whole arms, and "both arms" shoulders without hips, so that a person has at most one class. People
+who match no rule are in the class "none of these".
 """
 
 from collections.abc import Mapping
@@ -15,14 +15,14 @@ import pandas as pd
 from hicp_lib.core.keypoints import HEAD, INDEX
 from hicp_lib.formats.annotations import Annotations
 
-# A share of 20 people has a 95 % interval up to 0.44 wide, nearly half the scale: smaller classes are
-# counted, but nothing is said about them.
+# A proportion of 20 people has a 95 % interval up to 0.44 wide, nearly half the scale: smaller classes are
+# counted, but not evaluated.
 MIN_PEOPLE = 20
 
 NONE = "none of these"
 
 _WHOLE_ARMS = ("left_shoulder", "right_shoulder", "whole_left_arm", "whole_right_arm")
-# Class: parts that are in the picture, and parts that are not.
+# Class: parts that must be in the picture, and parts that must not.
 RULES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "whole upper body": (("head", *_WHOLE_ARMS), ()),
     "only head": (("head",), ("shoulder", "arm", "hip", "leg")),
@@ -96,7 +96,7 @@ def visibility_class(visibility: np.ndarray) -> np.ndarray:
 
 
 def people_classes(truth: Mapping[str, Annotations]) -> pd.DataFrame:
-    """The class of everybody who counts: columns `subset, image_id, annotation_id, class`."""
+    """The class of each evaluated person: columns `subset, image_id, annotation_id, class`."""
     tables = []
     for subset, of_subset in truth.items():
         people = of_subset.take(~of_subset.is_crowd)

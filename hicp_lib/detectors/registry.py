@@ -1,4 +1,4 @@
-"""The detectors by name, as the command line and the notebooks offer them (`data/detector_facts.json`)."""
+"""The detectors by name, for the command line and the notebooks (`data/detector_facts.json`)."""
 
 from dataclasses import dataclass
 from importlib import import_module
@@ -14,23 +14,23 @@ from hicp_lib.detectors.weights.user import user_options
 
 @dataclass(frozen=True)
 class Facts:
-    """What a detector is, as the paper's Table II tells it.
+    """Properties of a detector, as in the paper's Table II.
 
     Attributes
     ----------
     paradigm : {"top-down", "bottom-up", "one-stage"}
-        Whether people are looked for first and then their keypoints, or keypoints first, or both at once.
+        Whether people are found first and then their keypoints, or keypoints first, or both at once.
     keypoints : str
         How many, and of what.
     training_data : str
     tracking : str
-        How its authors' program follows people from image to image; here each image is looked at alone.
+        How its authors' program tracks people from image to image; here each image is processed alone.
     input : str
-        What an image becomes, width x height.
+        Size of the network's input, width x height.
     n_parameters : int or None
-        Of all its networks; None where the user's weights decide.
+        Of all its networks; None if it depends on the user's weights.
     n_operations : int or None
-        Multiplications with additions of one run of each.
+        Multiply-add operations of one run of each.
     """
 
     paradigm: str
@@ -44,20 +44,20 @@ class Facts:
 
 @dataclass(frozen=True)
 class Entry:
-    """A detector on offer.
+    """An available detector.
 
     Attributes
     ----------
     name : str
-        What users type.
+        The name that users type.
     label : str
-        What figures and tables call it.
+        Its name in figures and tables.
     groups : tuple of str
-        Keypoint groups it can be scored on, keys of `hicp_lib.core.keypoints.GROUPS`.
+        Keypoint groups on which it can be evaluated, keys of `hicp_lib.core.keypoints.GROUPS`.
     module, class_name : str
         Where it is; imported on demand, MediaPipe alone takes a second.
     needs_model : bool
-        It runs only on a weight file of the user's own, option `model`.
+        Whether it needs a weight file from the user, option `model`.
     facts : Facts
         What it is, for tables.
     """
@@ -71,7 +71,7 @@ class Entry:
     needs_model: bool = False
 
 
-# Modules in full: what a cached result depends on is found by these names (`hicp_lib.core.cache`).
+# Full module names: the dependencies of cached results are found by them (`hicp_lib.core.cache`).
 _CLASSES = {
     "hicp_lib.detectors.mediapipe.tasks": "MediaPipePose MediaPipeHands MediaPipe",
     "hicp_lib.detectors.movenet.networks": "MoveNetThunder MoveNetLightning MoveNetMultiPose",
@@ -85,13 +85,13 @@ _CLASSES = {
 }
 _MODULE_OF = {name: module for module, names in _CLASSES.items() for name in names.split()}
 COMBINED = "combined:"
-# Within a combination the body vouches for the hands: the hand model may be less sure, and others' hands
-# in a square must not use up the number.
+# In a combination the body confirms the hands, so the hand model's threshold is lower, and other people's
+# hands in a square must not use up the number.
 _HANDS_WITHIN: dict[str, dict[str, Any]] = {"mediapipe-hands": {"num_hands": 4, "min_score": 0.2}}
-# What numbers may be, by how their option's name ends; all others count something.
+# Allowed range of numbers, by the ending of the option's name; all others are counts.
 _BOUNDS = {"score": (0, 1), "overlap": (0, 1), "hz": (0, 1e4), "threads": (1, 256), "padding": (0.1, 10)}
 _BOUNDS |= {"scale": (0.001, 1000), "": (1, 10_000)}
-# Their counts are those of the committed and fetched files' convolutions and fully connected layers.
+# Parameters and operations are those of the convolutions and fully connected layers in the files.
 DETECTORS: dict[str, Entry] = {
     name: Entry(name, row.pop("label"), tuple(row.pop("groups")), _MODULE_OF[row["class_name"]],
                 facts=Facts(**row.pop("facts")), **row)
@@ -100,7 +100,7 @@ DETECTORS: dict[str, Entry] = {
 
 
 def default_detector_names() -> list[str]:
-    """Names of the detectors that run on weights that are fetched, without a file of the user's own."""
+    """Names of the detectors that need no weight file from the user."""
     return [entry.name for entry in DETECTORS.values() if not entry.needs_model]
 
 
@@ -117,16 +117,16 @@ def command_to_run(name: str) -> str:
 
 
 def command_to_use(name: str) -> str:
-    """The command that says which weights a detector takes from then on, in notebooks too."""
+    """The command that sets a detector's weights from then on, also in notebooks."""
     return f"hicp models use --detector {name} --model FILE.onnx"
 
 
 def make_detector(name: str, **options) -> Detector:
     """A detector ready to run.
 
-    One that needs a model and is given none takes those kept for it (`hicp_lib.detectors.weights.user`).
-    `combined:BODY+HANDS` puts two detectors together (see `hicp_lib.detectors.combined.detector`): its own
-    options, those of the hand detector with `hands_` before their names, and all others the body detector's.
+    A detector that needs a model and gets none uses the registered one (`hicp_lib.detectors.weights.user`).
+    `combined:BODY+HANDS` combines two detectors (see `hicp_lib.detectors.combined.detector`): it takes its
+    own options, those of the hand detector prefixed by `hands_`, and passes all others to the body detector.
 
     Parameters
     ----------
@@ -208,14 +208,14 @@ def _check_options(name: str, detector_class: type, options: dict) -> None:
             raise InputError(f"detector {name!r}: option {option!r} is {value!r}; expected {wanted}")
         least, most = next(of for end, of in _BOUNDS.items() if option.endswith(end))
         numbers = value if isinstance(value, list) else [value]
-        if not all(least <= one <= most for one in numbers if type(one) in (int, float)):  # NaN is neither
+        if not all(least <= one <= most for one in numbers if type(one) in (int, float)):  # NaN is outside
             raise InputError(
                 f"detector {name!r}: option {option!r} is {value!r}; expected {least:g} to {most:g}"
             )
 
 
 def describe(detector: Detector) -> list[tuple[str, str, str]]:
-    """What a detector takes for granted: rows of what, its value, and how that is known."""
+    """A detector's assumptions: rows of property, value, and how the value was determined."""
     if hasattr(detector, "describe"):
         return detector.describe()
     return [(key, str(value), "") for key, value in detector.settings.items()]

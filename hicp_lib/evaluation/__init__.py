@@ -1,1 +1,1 @@
-"""What detections are worth: precision, errors in the image and in space, and why they happen."""
+"""Evaluation of detections: precision, errors in the image and in space, and their causes."""

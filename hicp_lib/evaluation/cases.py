@@ -1,4 +1,4 @@
-"""What is judged: every detector on every subset, for the groups of keypoints it gives.
+"""The cases to evaluate: every detector on every subset, for its groups of keypoints.
 
 `Truth` is annotations by subset, `Found` detections by image id, of every (subset, detector). A *case* is a
 subset, a detector and a group of keypoints.
@@ -19,9 +19,9 @@ Found = Mapping[tuple[str, str], Mapping[int, Detections]]
 
 
 def groups_of(found: Found, detector: str) -> tuple[str, ...]:
-    """The keypoint groups a detector is scored on: its own, or those an imported one gives a keypoint of.
+    """The keypoint groups for which a detector is evaluated: its own, or those in an imported result.
 
-    A combination gives both. One run in several ways is labelled "NAME, how", and keeps its groups.
+    A combination gives both. A detector run in several ways is labelled "NAME, how", and keeps its groups.
 
     Examples
     --------
@@ -44,7 +44,7 @@ def groups_of(found: Found, detector: str) -> tuple[str, ...]:
 
 
 def all_cases(found: Found, groups: Iterable[str] = tuple(GROUPS)) -> Iterator[tuple[str, str, str]]:
-    """Subset, detector and group of every case; a detector of hands gives each hand, too."""
+    """Subset, detector and group of every case; with "each hand" for a detector of hands."""
     for subset, detector in found:
         for group in groups:
             if ("hand" if group.endswith("hand") else "body") in groups_of(found, detector):
@@ -52,7 +52,7 @@ def all_cases(found: Found, groups: Iterable[str] = tuple(GROUPS)) -> Iterator[t
 
 
 def labelled(table: pd.DataFrame, **labels: object) -> pd.DataFrame:
-    """The table with columns before its own, each of one value.
+    """The table with constant columns put before its own.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def labelled(table: pd.DataFrame, **labels: object) -> pd.DataFrame:
 
 
 def over_people(tables: Sequence[pd.DataFrame], n_frames: Sequence[int]) -> pd.DataFrame:
-    """Tables of frames of several people as one.
+    """Join tables of frames of several people.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def over_people(tables: Sequence[pd.DataFrame], n_frames: Sequence[int]) -> pd.D
     Returns
     -------
     DataFrame
-        A column `subject`, then theirs; frames are numbered on from person to person.
+        A column `subject`, then theirs; frame numbers continue from person to person.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def per_case(
     found: Found,
     groups: Mapping[str, tuple[str, ...]] | None = None,
 ) -> pd.DataFrame:
-    """A measure of every case, one below the other.
+    """A measure of every case, concatenated.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def per_case(
     found : Found
         By image id, of every subset and detector.
     groups : mapping of str to tuple of str, optional
-        The groups of each detector; those it gives when left out.
+        The groups of each detector; by default those it gives.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Which detection is of which person, by object keypoint similarity (OKS)."""
+"""Match detections to people by object keypoint similarity (OKS)."""
 
 from collections.abc import Iterator, Mapping
 
@@ -8,7 +8,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.oks import oks
 from hicp_lib.formats.annotations import Annotations
 
-MATCH_OKS = 0.1  # least similarity of a detection to a person it is said to be of (Ronchi and Perona 2017)
+MATCH_OKS = 0.1  # minimum similarity to match a detection to a person (Ronchi and Perona 2017)
 
 
 def pairwise_oks(
@@ -41,12 +41,12 @@ def pairwise_oks(
 def best_oks(
     people: Annotations, found: Mapping[int, Detections], keypoints: np.ndarray, sigmas: np.ndarray
 ) -> Iterator[tuple[int, float]]:
-    """How well everybody who counts and has a labelled keypoint of a group is found.
+    """How well each evaluated person with a labelled keypoint of a group is found.
 
     Parameters
     ----------
     people : Annotations
-        Of any images; crowds do not count.
+        Of any images; crowds are not evaluated.
     found : mapping of int to Detections
         By image id.
     keypoints : array of int, shape (k,)
@@ -59,7 +59,7 @@ def best_oks(
     row : int
         The person's, in `people`.
     oks : float
-        Of the detection that fits best, 0 where there is none.
+        Of the best detection, 0 if there is none.
     """
     labelled = people.visibility[:, keypoints] > 0
     for i in np.flatnonzero(labelled.any(axis=1) & ~people.is_crowd).tolist():
@@ -70,16 +70,16 @@ def best_oks(
 
 
 def match_best_first(fit: np.ndarray, scores: np.ndarray, least: float = MATCH_OKS) -> dict[int, int]:
-    """Detections, best first, take the free person they fit best.
+    """Match detections, best first, to the free person with the highest similarity.
 
     Parameters
     ----------
     fit : array, shape (n_people, n_detections)
         Similarity of each pair.
     scores : array, shape (n_detections,)
-        What detections are ranked by; of equal ones the first comes first.
+        Scores by which detections are ranked; equal ones keep their order.
     least : float, optional
-        Similarity that is asked for.
+        Minimum similarity.
 
     Returns
     -------
@@ -104,9 +104,9 @@ def match_best_first(fit: np.ndarray, scores: np.ndarray, least: float = MATCH_O
 def matched_people(
     people: Annotations, found: Detections, keypoints: np.ndarray, sigmas: np.ndarray
 ) -> dict[int, int]:
-    """The detection of each person who has one, with an OKS of at least `MATCH_OKS`.
+    """The matched detection of each person, with an OKS of at least `MATCH_OKS`.
 
-    People without a labelled keypoint take no part: anything near them would fit.
+    People without a labelled keypoint are left out: any detection near them would match.
 
     Parameters
     ----------

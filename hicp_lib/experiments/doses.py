@@ -1,15 +1,15 @@
-"""Doses: the same person, pose and room, with one thing varied and all else fixed.
+"""Doses: the same person, pose and room, with one factor varied and everything else fixed.
 
-A person stands in the laboratory before a camera that looks level from `EYE_M` above the floor. Every
-picture is of one dose at one level:
+A person stands in the laboratory in front of a horizontal camera at `EYE_M` above the floor. Every picture
+shows one dose at one level:
 
 - "distance": of the camera, in metres. The lens is fixed, so a near camera sees less of the person.
-- "light": a share of the laboratory's. The camera makes up for it by amplification: shot noise grows with
-  the root of the missing light, read noise in proportion.
-- "hidden": a board, out of reach before the person, hides this share of their height from below.
+- "light": a fraction of the laboratory's. The camera compensates for it by amplification: shot noise grows
+  with the root of the missing light, read noise in proportion.
+- "hidden": a board in front of the person, out of reach, occludes this fraction of their height from below.
 - "resolution": height of the picture in pixels, of the same view, by down-sampling.
-- "upper part", "lower part": the share of the person's height that the picture shows, from the head down
-  and from the feet up; cut from the same picture.
+- "upper part", "lower part": the fraction of the person's height in the picture, from the head down and from
+  the feet up; cut from the same picture.
 
 The area in the annotations, the s² of OKS, is that of the whole unhidden person at the picture's scale, so
 that the same error in body sizes counts the same at every level.
@@ -54,7 +54,7 @@ _POSES = ("standing", "reaching", "reaching_both", "pointing", "raised", "hips")
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture of one person and what is true of them there.
+    """A picture of one person with ground truth.
 
     Attributes
     ----------
@@ -77,9 +77,9 @@ class Picture:
 
 
 def open_doses(n_people: int = 10, seed: int = 0) -> Path:
-    """Dataset folder (`images/`, `annotations.json`) of all doses; rendered first if it is not in the cache.
+    """Dataset folder (`images/`, `annotations.json`) of all doses; rendered first if not cached.
 
-    People in the annotations carry `dose`, `level`, and `source_image_id`, the number of the person.
+    People in the annotations have the keys `dose`, `level`, and `source_image_id`, the number of the person.
     """
     folder = cache_dir() / "doses" / key([open_doses], n_people=n_people, seed=seed)[:_KEY_LENGTH]
     if not (folder / "annotations.json").is_file():
@@ -148,7 +148,7 @@ def _at_distance(person, world, distance_m: float, base: Picture, subject: Subje
 
 
 def _hidden(person, world, share: float, base: Picture, subject: Subject) -> Picture:
-    """A board whose upper edge is seen at the given share of the person's height above their feet."""
+    """A board whose upper edge appears at the given fraction of the person's height above their feet."""
     rows = np.flatnonzero(base.mask.any(axis=1))
     edge_px = rows[-1] - share * (rows[-1] - rows[0])
     depth_m = DISTANCE_M - _BOARD_M

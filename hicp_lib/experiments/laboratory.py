@@ -1,8 +1,8 @@
-"""The laboratory: a robot on its stand, who is before it, furniture, light and the robot's camera.
+"""The laboratory: a robot on its stand, a person in front of it, furniture, light and the robot's camera.
 
-World frame: z up, floor at z = 0, metres. The robot faces the world's y axis; its root frame (x
-backward, y to its right, z up) lies above the world's origin, as high as when an iCub stands upright
-on its stand: 0.6 m above the floor is assumed. The robot itself is not drawn.
+World frame: z up, floor at z = 0, metres. The robot faces the world's y axis; its root frame (x backward, y
+to its right, z up) lies above the world's origin, at the height of an iCub on its stand: 0.6 m above the
+floor is assumed. The robot itself is not drawn.
 """
 
 from itertools import product
@@ -31,7 +31,7 @@ from hicp_lib.simulation.world.room import make_room
 Rng = np.random.Generator
 
 MOVEMENTS = read_json(DATA_DIR / "movements.json")
-"""What people do in experiments: joint angles (degrees; from two of them one is drawn), and doses."""
+"""Behaviour in experiments: joint angles (degrees; one is sampled between two), and doses."""
 PELVIS_LEAN = "pelvis_flexion"  # a joint of postures only: the whole trunk bends at the hips
 ROOT_HEIGHT_M = 0.6
 T_WORLD_ROOT = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, ROOT_HEIGHT_M], [0, 0, 0, 1]])
@@ -40,7 +40,7 @@ COLOUR = Camera(640, 480, 616.591, 616.765, 318.482, 241.167)
 PHOTOGRAPHIC = Sensor(
     np.ones(3), exposure=0.9, blur_px=0.6, vignette=0.15, shot_noise=0.012, read_noise=0.003, contrast=1.1
 )
-"""The colour camera's rendition: that of a good webcam."""
+"""The colour camera's image quality: that of a good webcam."""
 
 
 def robot_camera(T_root_camera: np.ndarray) -> PlacedCamera:
@@ -57,17 +57,17 @@ def robot_camera(T_root_camera: np.ndarray) -> PlacedCamera:
 def colour_and_depth(
     frame: Frame, camera: PlacedCamera, rng: Rng, depth_camera: DepthCamera = D435
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What the depth camera on the robot's head takes of a frame.
+    """Images of a frame by the depth camera on the robot's head.
 
     Parameters
     ----------
     frame : Frame
     camera : PlacedCamera
-        That the frame was rendered for.
+        The camera of the frame.
     rng : numpy.random.Generator
         Of the noise of both sensors.
     depth_camera : DepthCamera, optional
-        Changes nothing in the colour image.
+        Does not affect the colour image.
 
     Returns
     -------
@@ -111,7 +111,7 @@ def furnished(
     Parameters
     ----------
     identity : Identity
-        Whose room and lights they are.
+        Determines room and lights.
     surfaces : list of Surface
     clear_m : list of tuple of float
         Discs (x, y, radius) without furniture.
@@ -176,7 +176,7 @@ def chair(rng: Rng, middle_m: tuple[float, float], seat_m: float) -> list[Surfac
 
 
 def _lighting(rng: Rng, height_m: float) -> tuple[list[lights.Light], lights.Ambient]:
-    """Two rows of tubes at the ceiling, warm or cool, and what walls and floor return of it."""
+    """Two rows of tubes at the ceiling, warm or cool, and their reflection by walls and floor."""
     half_u, half_v, cool = np.array([0.1, 0, 0]), np.array([0, 0.75, 0]), rng.uniform(-0.12, 0.12)
     white = rng.uniform(0.85, 1.15) * np.array([1 - cool, 1.0, 1 + cool])
     middles = (np.array([x, 0.3, height_m - 0.1]) for x in (-0.9, 0.9))

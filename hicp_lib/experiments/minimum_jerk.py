@@ -1,8 +1,8 @@
 """Movements of a person as joint angles over time: postures, and minimum-jerk paths between them.
 
-Between two postures every joint follows 10 s^3 - 15 s^4 + 6 s^5, s from 0 to 1: the smoothest way
-from rest to rest, and how people's arms move (Flash and Hogan, *The Coordination of Arm Movements*,
-J. Neuroscience 1985). Joints stay within the ranges of the postures, so within their limits.
+Between two postures every joint follows 10 s^3 - 15 s^4 + 6 s^5, s from 0 to 1: the smoothest path from rest
+to rest, similar to human arm movements (Flash and Hogan, *The Coordination of Arm Movements*, J. Neuroscience
+1985). Joints stay within the ranges of the postures, so within their limits.
 """
 
 from bisect import bisect_right
@@ -16,7 +16,7 @@ from hicp_lib.simulation.body.joints import Joints
 
 @dataclass(frozen=True)
 class Posture:
-    """Joint angles (radians), and where the person stands: x, y on the floor in metres."""
+    """Joint angles (radians), and the person's position: x, y on the floor in metres."""
 
     joints: Joints
     place_m: tuple[float, float]
@@ -24,19 +24,19 @@ class Posture:
 
 @dataclass(frozen=True)
 class Move:
-    """A movement that takes `duration_s` and ends in a posture; a pause where it is the one before."""
+    """A movement that takes `duration_s` and ends in a posture; a pause if that is the same as before."""
 
     duration_s: float
     to: Posture
 
 
 def between(a: Posture, b: Posture, share: float) -> Posture:
-    """The posture a share of the way from one to another.
+    """The posture at a fraction of the path from one to another.
 
     Parameters
     ----------
     a, b : Posture
-        Joints that one of them lacks are at zero there.
+        Joints missing in one of them are zero there.
     share : float
         0 to 1.
 
@@ -44,7 +44,7 @@ def between(a: Posture, b: Posture, share: float) -> Posture:
     -------
     Posture
     """
-    names = [*a.joints | b.joints]  # in the same order in every process, as those of a set are not
+    names = [*a.joints | b.joints]  # in the same order in every process, unlike a set
     start, end = (np.array([p.joints.get(name, 0.0) for name in names]) for p in (a, b))
     place = np.array(a.place_m) + share * (np.array(b.place_m) - a.place_m)
     joints = dict(zip(names, (start + share * (end - start)).tolist(), strict=True))
@@ -52,7 +52,7 @@ def between(a: Posture, b: Posture, share: float) -> Posture:
 
 
 def minimum_jerk(s: float) -> float:
-    """Share of the way after a share `s` of the time, both 0 to 1.
+    """Fraction of the path after a fraction `s` of the time, both 0 to 1.
 
     Examples
     --------
@@ -64,14 +64,14 @@ def minimum_jerk(s: float) -> float:
 
 @dataclass
 class Motion:
-    """Movements one after another from a first posture, drawn only as far as they are asked for.
+    """A sequence of movements from a first posture, sampled only as far as needed.
 
     Attributes
     ----------
     first : Posture
         Until time 0.
     moves : iterator of Move
-        What comes then, without end.
+        The following movements, endless.
 
     Examples
     --------
@@ -100,14 +100,14 @@ class Motion:
         return between(self._postures[k - 1], self._postures[k], share)
 
     def still_since_s(self, time_s: float) -> float:
-        """From when on the posture has been that of a time; the time itself where it is changing."""
+        """Since when the posture has been the one at a time; the time itself if it is changing."""
         k = start = self._move_at(time_s)
         while start and self._postures[start - 1] == self._postures[start]:
             start -= 1
         return time_s if 0 < start == k else self._ends_s[start]
 
     def _move_at(self, time_s: float) -> int:
-        """Which movement a time belongs to, from 1 on; 0 before all. Movements up to there are drawn."""
+        """The movement at a time, from 1 on; 0 before all. Samples movements up to there."""
         if time_s <= 0:
             return 0
         while self._ends_s[-1] <= time_s:

@@ -1,20 +1,20 @@
-"""COCO files in and out: annotated people, and detections as COCO keypoint results.
+"""Read and write COCO files: annotated people, and detections as COCO keypoint results.
 
-Both are checked where they enter. Conventions of this module, where formats in the wild differ:
+Both are checked when they are read. Conventions of this module, where existing files differ:
 
-- People come in the Halpe-136 layout whatever the file has: by its keypoints' names (`layouts`), or where it
-  gives none by their number, 17 (COCO), 26, 133 or 136. People are told by their category's name.
-- Coordinates are pixels, of which boxes have the corner and keypoints the centre of the first at 0, 0;
-  fractions of the image are refused, and boxes that are x1, y1, x2, y2 (`units`).
-- A person whose area is absent, below a hundredth or above twice the box has 0.53 of the box instead, as
-  tools take it that have no segments; `Annotations.notes` says so.
-- A keypoint is labelled when its flag v > 0; flags are floats and kept as they are (Halpe and
-  COCO-WholeBody files hold values other than 0, 1 and 2), except that v <= 0 becomes 0 and v = 3, in
-  CropCOCO's layout a keypoint outside the picture, becomes `cropcoco.OUTSIDE`; it is written as 3 again.
+- People are converted to the Halpe-136 layout: by the file's keypoint names (`layouts`), or without names by
+  their number, 17 (COCO), 26, 133 or 136. People are recognised by their category's name.
+- Coordinates are pixels. The origin of boxes is the corner of the first pixel, that of keypoints its centre.
+  Fractions of the image, and boxes given as x1, y1, x2, y2, are refused (`units`).
+- For a person whose area is absent, below a hundredth or above twice the box, 0.53 of the box is used
+  instead, as in tools without segments; `Annotations.notes` says so.
+- A keypoint is labelled when its flag v > 0; flags are floats and kept as they are (Halpe and COCO-WholeBody
+  files have values other than 0, 1 and 2), except that v <= 0 becomes 0, and v = 3, which means a keypoint
+  outside the picture in CropCOCO's layout, becomes `cropcoco.OUTSIDE`; it is written as 3 again.
 - `num_keypoints` is not read (in Halpe's files it counts the body, or nothing); it is written as in
   Halpe's validation set, the number of labelled keypoints out of COCO's 17.
-- Detections keep the scores they come with, which need not lie in [0, 1]. A keypoint 0, 0, 0 is
-  one the detector does not give. Equal detections are allowed: the second is a false positive.
+- Detections keep the scores they come with, which need not lie in [0, 1]. A keypoint 0, 0, 0 is missing.
+  Equal detections are allowed: the second is a false positive.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class ImageInfo:
     Attributes
     ----------
     id : int
-        What annotations and detections name it by.
+        The id that annotations and detections refer to.
     file_name : str
         Relative to the folder of images.
     width_px, height_px : int
@@ -83,7 +83,7 @@ class Annotations:
     areas_px2 : array, shape (n,)
         Area of the person's segment, the s² of OKS.
     is_crowd : array of bool, shape (n,)
-        Never counted; a detection there is neither right nor wrong.
+        Not evaluated; a detection there counts neither as correct nor as wrong.
     keypoints_px : array, shape (n, 136, 2)
         NaN where not known.
     visibility : array, shape (n, 136)
@@ -93,8 +93,7 @@ class Annotations:
     category : PersonCategory
         Of people in the file.
     notes : dict of str to str
-        What a reader of the figures must know of the file, by what it is about: what was left out, assumed or
-        is doubtful.
+        Remarks on the file, by topic: what was left out, assumed, or is doubtful.
 
     Examples
     --------
@@ -120,7 +119,7 @@ class Annotations:
 
     @property
     def is_other(self) -> np.ndarray:
-        """Who only reaches into the crop of somebody else: array of bool, shape (n,)."""
+        """Which people only reach into another person's crop: array of bool, shape (n,)."""
         return np.array([bool(extra.get("other")) for extra in self.extras], dtype=bool)
 
     def take(self, rows: np.ndarray) -> Annotations:
@@ -137,7 +136,7 @@ class Annotations:
 
     @classmethod
     def concatenate(cls, parts: Sequence[Annotations], images: dict[int, ImageInfo]) -> Annotations:
-        """The people of all parts, in `images`, with the ids they have; parts may be none at all."""
+        """The people of all parts, in `images`, with their ids; there may be no parts at all."""
         arrays: dict[str, Any] = {
             name: np.concatenate([empty, *(getattr(part, name) for part in parts)])
             for name, empty in _NOBODY.items()
@@ -161,7 +160,7 @@ _NOBODY = {
 
 
 def rows_by_image(image_ids: np.ndarray) -> dict[int, np.ndarray]:
-    """The rows of each image, in the order they have; images by their ids.
+    """The rows of each image, in their order; images by id.
 
     Examples
     --------
@@ -182,14 +181,14 @@ def source_images(annotations: Annotations) -> dict[int, int]:
 
 
 def read_annotations(path: str | Path, keypoint_map: str | Path | None = None) -> Annotations:
-    """Read keypoint annotations in COCO's layout, of any keypoints whose names are given.
+    """Read keypoint annotations in COCO's layout, with any keypoints whose names are known.
 
     Parameters
     ----------
     path : str or Path
         A JSON file with `images` and `annotations`.
     keypoint_map : str or Path, optional
-        A file that says what its keypoints' names mean, as of `hicp_lib.formats.layouts.layouts_of`.
+        A file that says what the keypoint names mean, as in `hicp_lib.formats.layouts.layouts_of`.
 
     Returns
     -------
@@ -221,7 +220,7 @@ def read_annotations(path: str | Path, keypoint_map: str | Path | None = None) -
 
 
 def _of_people(rows: Rows, people: PersonCategory, allowed: set[int]) -> Rows:
-    """The people among objects of allowed categories; one without is a person where there is no other."""
+    """The people among the objects; one without a category is a person if there is no other category."""
     expected = f"one of {', '.join(map(str, sorted(allowed)))}; {people.id} is people"
     default = {} if people.others else {"default": people.id}
     found = rows.column("category_id", lambda of: type(of) is int and of in allowed, expected, **default)
@@ -269,7 +268,7 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> 
 
 
 def _areas(rows: Rows, boxes_px: np.ndarray, is_crowd: np.ndarray) -> tuple[np.ndarray, str]:
-    """The areas, those that can be none replaced, and how many these are in words."""
+    """The areas, with implausible ones replaced, and a note on their number."""
     given = [[0 if area is None else area] for area in rows.column("area", default=None)]
     areas = rows.finite(given, 1, lambda j: "area")[:, 0]
     for i in np.flatnonzero(areas < 0)[:1]:
@@ -317,15 +316,14 @@ def image_rows(annotations: Annotations) -> list[dict]:
 def read_detections(path: str | Path, annotations: Annotations | None = None) -> dict[int, Detections]:
     """Read COCO keypoint results (a list of `image_id, category_id, keypoints, score`).
 
-    An empty list is a result: nobody was found. Where every result has a `file_name`, it says which image is
-    meant.
+    An empty list is valid: nobody was found. If every result has a `file_name`, it identifies the image.
 
     Parameters
     ----------
     path : str or Path
         A JSON file.
     annotations : Annotations, optional
-        Every image must be among theirs, and images without a detection come back with none.
+        Every image must be among theirs; images without a detection get an empty result.
 
     Returns
     -------
@@ -356,7 +354,7 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
 
 
 def _images_of(rows: Rows, images: Mapping[int, ImageInfo]) -> np.ndarray:
-    """The annotated image of each result: by name where all have one: tools number differently."""
+    """The annotated image of each result; by name if all have one, since tools number images differently."""
     if not rows.rows or not all("file_name" in row for row in rows.rows):
         ids = rows.integers("image_id")
         for i in np.flatnonzero(~np.isin(ids, list(images)))[:1].tolist():
@@ -383,7 +381,7 @@ def write_detections(
     detections : mapping of int to Detections
         By image id.
     extras : mapping of int to list of dict, optional
-        By image id, further keys of each person's JSON object; readers pass over them. Not in tables.
+        By image id, further keys of each person's JSON object; readers ignore them. Not in tables.
     """
     with open_detections(path) as write:
         for image_id, found in detections.items():

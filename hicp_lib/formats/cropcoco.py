@@ -1,10 +1,10 @@
-"""What annotations in CropCOCO's layout say of keypoints outside the picture.
+"""Keypoints outside the picture, from annotations in CropCOCO's layout.
 
 CropCOCO (Purkrabek and Matas, ProbPose, CVPR 2025) is COCO's layout with one flag more: v = 3 marks a
-keypoint that the person has, but outside the picture. Its place is given where it is known and is 0, 0
-otherwise. A person may have `pad_to_contain`, a number per keypoint: how many times the box, brought to
-the shape of a network's input, must grow about its centre to contain the keypoint (-1 for one without a
-label). Up to `PADDING` the network sees it, and its place counts (`hicp_lib.evaluation.ap.extended_oks`).
+keypoint that the person has, but outside the picture. Its position is given if known and is 0, 0 otherwise. A
+person may have `pad_to_contain`, a number per keypoint: the factor by which the box, extended to the aspect
+ratio of a network's input, must be enlarged about its centre to contain the keypoint (-1 for one without a
+label). Up to `PADDING` the network sees it, and its position counts (`hicp_lib.evaluation.ap.extended_oks`).
 """
 
 from typing import Any
@@ -41,7 +41,7 @@ def outside_from_flags(rows: Rows, triples: np.ndarray, sizes_px: np.ndarray) ->
     Raises
     ------
     InputError
-        If a keypoint is flagged as outside but placed in the picture, or its place is needed but not given,
+        If a keypoint is flagged as outside but lies in the picture, or its position is needed but not given,
         or `pad_to_contain` is not a number for each of the 17 keypoints.
     """
     outside = triples[..., 2] == FLAG_OUTSIDE

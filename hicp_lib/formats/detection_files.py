@@ -1,11 +1,11 @@
-"""Detections written one image after the other, however many: JSON, CSV or Parquet, as the suffix says.
+"""Detections written image by image, in any number: JSON, CSV or Parquet, by the file's suffix.
 
-- `.json`: COCO keypoint results, a list with an object for each person, 136 keypoints in Halpe's order. What
-  is known of the image (`file_name`; of a video's frame `frame` and `time_s`) stands beside `image_id`.
+- `.json`: COCO keypoint results, a list with an object for each person, 136 keypoints in Halpe's order. Next
+  to `image_id` stands what is known of the image (`file_name`; for a video, `frame` and `time_s`).
 - `.csv`, `.parquet`: one row per image x person x keypoint given; columns `image_id`, what is known of the
   image, `person` (from 0), `person_score`, `keypoint` (Halpe's name), `u_px`, `v_px`, `score`.
 
-The bytes follow from the detections and their order alone.
+The bytes depend on the detections and their order only.
 """
 
 import json
@@ -34,7 +34,7 @@ _Append = Callable[..., None]
 
 
 def refuse_other_suffix(path: str | Path, suffixes: Sequence[str] = SUFFIXES) -> None:
-    """Refuse, before anything is done, a file to write that is in none of the formats.
+    """Refuse an output file whose suffix is none of the formats, before any work is done.
 
     Parameters
     ----------
@@ -66,8 +66,8 @@ def open_detections(path: str | Path) -> Iterator[_Append]:
     Yields
     ------
     callable
-        Takes, of one image after the other, its id, what is known of it, the people in it, and if there are
-        any, further keys of each person's object in JSON.
+        Takes, image by image, its id, what is known of it, the people in it, and optionally further keys of
+        each person's JSON object.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def json_list(path: Path) -> Iterator[_Append]:
             for item in items:
                 try:
                     text = orjson.dumps(item, option=orjson.OPT_SERIALIZE_NUMPY)
-                except TypeError:  # whole numbers beyond 64 bits, halves of characters, of other tools
+                except TypeError:  # integers beyond 64 bits and lone surrogates, from other tools
                     text = json.dumps(item, default=np.ndarray.tolist, allow_nan=False).encode()
                 file.write(between + text)
                 between = b",\n"
@@ -159,7 +159,7 @@ def result_rows(
 
 @contextmanager
 def _table(path: Path) -> Iterator[_Append]:
-    """Write people as rows of a table, a group at a time."""
+    """Write people as rows of a table, in batches."""
     waiting: list[dict] = []
     with ExitStack() as stack:
         write = _append_csv(path) if path.suffix == ".csv" else _append_parquet(path, stack)
@@ -194,7 +194,7 @@ def _append_parquet(path: Path, stack: ExitStack) -> _Append:
 
 
 def _by_keypoint(people: list[dict]) -> pd.DataFrame:
-    """People as of `result_rows`, all of an image one after the other, as a row for each keypoint."""
+    """One row per keypoint of the people of an image, from `result_rows`."""
     triples = np.array([row.pop("keypoints") for row in people]).reshape(-1, N_KEYPOINTS, 3)
     table = pd.DataFrame(people or {"image_id": np.zeros(0, int), "category_id": 1, "score": 0.0})
     table.insert(table.columns.get_loc("score"), "person", table.groupby("image_id").cumcount())
@@ -206,7 +206,7 @@ def _by_keypoint(people: list[dict]) -> pd.DataFrame:
 
 
 def read_rows(path: Path) -> Any:
-    """What a file of COCO keypoint results holds, to be checked: a list of objects, also out of a table.
+    """The unchecked content of a file of COCO keypoint results: a list of objects, also from a table.
 
     Raises
     ------
@@ -227,7 +227,7 @@ def read_rows(path: Path) -> Any:
         first = people[["person_score", *table.columns.intersection(["file_name"])]].first()
     except (KeyError, OSError, TypeError, ValueError) as error:  # pyarrow's and pandas' own are among these
         problem = f"{type(error).__name__}: {one_line(error)}"
-        raise InputError(f"{path}: is no table that hicp detect wrote ({problem})") from None
+        raise InputError(f"{path}: is not a table written by hicp detect ({problem})") from None
     triples = np.zeros((people.ngroups, N_KEYPOINTS, 3))
     triples[people.ngroup(), keypoints] = values
     rows = first.rename(columns={"person_score": "score"}).reset_index().to_dict("records")

@@ -1,4 +1,4 @@
-"""Detections made elsewhere, taken into the comparison beside the detectors that are run here."""
+"""Detections made elsewhere, for comparison with the detectors that are run here."""
 
 import re
 from collections.abc import Mapping
@@ -17,13 +17,13 @@ def read_imported(
 ) -> dict[tuple[str, str], dict[int, Detections]]:
     """Detections by (subset, "NAME-imported"), as `hicp_lib.evaluation.ap.metric_table` takes them.
 
-    The suffix tells them from a detector of that name which is run here.
+    The suffix distinguishes them from a detector of that name which is run here.
 
     Parameters
     ----------
     folder : str or Path
-        Holds a folder for each detector, of the detector's name, with a file of detections for each subset in
-        it: `mmpose/basic.json`, `mmpose/headless.json`, ..., as `hicp import` and `hicp detect` write them;
+        Contains a folder per detector, named after it, with a file of detections for each subset:
+        `mmpose/basic.json`, `mmpose/headless.json`, ..., as `hicp import` and `hicp detect` write them; an
         empty text for none.
     truth : mapping of str to Annotations
         By subset.
@@ -36,7 +36,7 @@ def read_imported(
     Raises
     ------
     InputError
-        For a folder without such folders, names that are no names, and files that are absent or do not fit.
+        For a folder without such folders, invalid names, and files that are missing or do not fit.
     """
     if not folder:
         return {}

@@ -1,4 +1,4 @@
-"""Lists of JSON objects from outside (COCO files), checked key by key and made into arrays."""
+"""Lists of JSON objects from external files (COCO), checked key by key and converted to arrays."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import numpy as np
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES, TO_HALPE
 
-# Beyond any image and any detector's raw output, and small enough for squares and products.
+# Larger than any image or detector output, and small enough for squares and products.
 MAX_ABS = 1e9
 MAX_INTEGER = 2**53  # every JSON reader has them exact up to here
 CONVENTIONS = {17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"}
@@ -33,8 +33,7 @@ _Check = Callable[[Any], bool]
 class Rows:
     """The objects of one list in a file.
 
-    Every method returns one value (or vector) per row, or raises `InputError` for the first row that is not
-    as expected.
+    Every method returns one value (or vector) per row, or raises `InputError` for the first invalid row.
 
     Attributes
     ----------
@@ -45,7 +44,7 @@ class Rows:
     rows : list of dict
         The objects.
     name_key : str
-        Key that tells a reader which row is meant ("id", or "image_id").
+        Key that identifies a row in messages ("id", or "image_id").
 
     Examples
     --------
@@ -75,7 +74,7 @@ class Rows:
         value : Any
             What JSON gave.
         name_key : str, optional
-            Key that tells a reader which row is meant.
+            Key that identifies a row in messages.
 
         Returns
         -------
@@ -108,7 +107,7 @@ class Rows:
         expected : str, optional
             What a value should be, for the message.
         default : Any, optional
-            Value of rows without the key; left out, every row needs one.
+            Value of rows without the key; by default every row needs one.
 
         Returns
         -------
@@ -148,9 +147,9 @@ class Rows:
     def keypoints(self, layouts: Layouts = CONVENTIONS) -> tuple[np.ndarray, Counter[str]]:
         """Triples (x, y, v) in the Halpe-136 order, zeros where the file's layout has no such keypoint.
 
-        Accepts 17 (COCO), 26 (Halpe body), 133 (COCO-WholeBody, also spread over its five keys) and 136
-        (Halpe) keypoints, row by row, if not told otherwise. The rows have no `keypoints` afterwards: those
-        of very many people are held once.
+        Unless `layouts` is given, accepts 17 (COCO), 26 (Halpe body), 133 (COCO-WholeBody, also in its five
+        keys) and 136 (Halpe) keypoints, row by row. The rows lose their `keypoints`, so that large data are
+        held in memory once.
 
         Parameters
         ----------
@@ -205,7 +204,7 @@ class Rows:
         return values, found
 
     def extras(self, known: Collection[str]) -> list[dict]:
-        """Per row, the keys other than `known`; refused where JSON could not be written from them again."""
+        """Per row, the keys other than `known`; refused if they could not be written as JSON again."""
         extras = [{key: value for key, value in row.items() if key not in known} for row in self.rows]
         for i, extra in enumerate(extras):
             try:
@@ -248,7 +247,7 @@ class Rows:
         array, shape (len(lists), width)
         """
         try:
-            # The types first: numpy would take True for 1 and "3" for 3.
+            # Check types first: numpy would accept True as 1 and "3" as 3.
             plain = chain.from_iterable(of for of in lists if isinstance(of, list))
             if set(map(type, plain)) <= {int, float}:
                 array = np.array(lists, dtype=float).reshape(len(lists), width)
@@ -280,7 +279,7 @@ def _triples_namer(key: str, indices: np.ndarray) -> Callable[[int], str]:
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether something read from outside is a finite number; truth values are none.
+    """Whether a value from external data is a finite number; truth values are not.
 
     Parameters
     ----------
@@ -302,7 +301,7 @@ def is_number(value: object) -> TypeGuard[float]:
 
 
 def shown(value: Any) -> str:
-    """A value as a short piece of one line.
+    """A short, one-line description of a value for messages.
 
     Examples
     --------

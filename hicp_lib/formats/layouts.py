@@ -1,12 +1,12 @@
-"""What a file's own names mean: which category are people, and which keypoint of Halpe-136 each is.
+"""The meaning of names in a file: which category is people, and which Halpe-136 keypoint each name is.
 
-A keypoint's name is read without regard to case and separators, with its side first or last: `left_shoulder`,
-`Left Shoulder`, `LShoulder`, `shoulder.l` and `lShoulder` are one. `data/keypoint_names.json` has for each of
-ours what data sets call it:
+Case and separators in a keypoint's name are ignored, and the side may come first or last: `left_shoulder`,
+`Left Shoulder`, `LShoulder`, `shoulder.l` and `lShoulder` are the same. `data/keypoint_names.json` lists the
+names of each keypoint in data sets:
 
-- `upper_neck` and `head_bottom` (MPII, PoseTrack) are taken for the neck; `pelvis`, `root` and a `hip`
-  without a side for the middle of the hips; `foot` for the ankle where no ankle is named (Human3.6M's are
-  ankles); `foot_index` (MediaPipe) for the big toe.
+- `upper_neck` and `head_bottom` (MPII, PoseTrack) are read as the neck; `pelvis`, `root` and a `hip` without
+  a side as the middle of the hips; `foot` as the ankle if no ankle is named (as in Human3.6M); `foot_index`
+  (MediaPipe) as the big toe.
 - `head` is the head's top in CrowdPose's and Halpe's layouts; in others it is the middle of the face or of
   the skull, which is left out, as are thorax, spine, belly, the points of Human-Art's hands and toes, and
   MediaPipe's other points of face and hands.
@@ -41,9 +41,9 @@ class PersonCategory:
     Attributes
     ----------
     id : int
-        What objects name it by.
+        The id that objects refer to.
     keypoints : list of str
-        Its keypoints' names; none where the file does not give them.
+        Its keypoints' names; empty if the file does not give them.
     others : set of int
         Ids of the file's other categories.
     """
@@ -105,7 +105,7 @@ _TABLE = _spellings()
 
 
 def halpe_name(name: str) -> str | None:
-    """The keypoint that a name means: a name of ours, another that we have no keypoint for, or None.
+    """The Halpe keypoint of a name; "other" for a known name without a counterpart, None for an unknown one.
 
     Examples
     --------
@@ -127,7 +127,7 @@ def _keypoint_map(path: str | Path) -> dict[str, str | None] | list[str]:
 def layouts_of(
     where: str, names: Sequence[str], keypoint_map: str | Path | None = None
 ) -> tuple[Layouts, dict[str, str]]:
-    """Where a file's keypoints belong, by the number of them that a person has.
+    """The Halpe indices of a file's keypoints, by the number of keypoints per person.
 
     Parameters
     ----------
@@ -136,20 +136,20 @@ def layouts_of(
     names : sequence of str
         The names the file gives its keypoints; none if it does not.
     keypoint_map : str or Path, optional
-        A JSON file: an object of their names to ours, null for a keypoint to leave out; or a list that
-        stands in place of the names.
+        A JSON file: an object from their names to ours, null for a keypoint to leave out; or a list of names
+        that replaces the file's.
 
     Returns
     -------
     layouts : dict of int to array of int
         As of `hicp_lib.formats.json_validation.Rows.points`.
     notes : dict of str to str
-        What was left out, and what was taken for what.
+        What was left out, and which names were read as which keypoint.
 
     Raises
     ------
     InputError
-        For names that are not understood, and two that mean one.
+        For unknown names, and two names of the same keypoint.
     """
     given = _keypoint_map(keypoint_map) if keypoint_map else {}
     names, given = (given, {}) if isinstance(given, list) else (names, given)

@@ -1,6 +1,6 @@
-"""Files of COCO's layout read in blocks, however many people: their keypoints become arrays on the way.
+"""Read COCO files of any size in blocks, converting keypoints to arrays on the way.
 
-A number takes 8 bytes in an array, and 32 among Python's objects beside the 5 to 20 of its text.
+A number takes 8 bytes in an array, but 32 as a Python object, plus 5 to 20 for its text.
 """
 
 import re
@@ -34,7 +34,7 @@ def read_people(path: str | Path) -> Any:
     Returns
     -------
     Any
-        A list of other things than numbers, or one elsewhere, is a list. Numbers of an array may be any.
+        Only `keypoints` lists of plain numbers become arrays; the numbers are not checked.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def read_people(path: str | Path) -> Any:
 
 
 def _blocks(file: BinaryIO) -> Iterator[bytes]:
-    """A file's content, cut where no list of keypoints is cut, if they are shorter than a block."""
+    """A file's content in blocks that do not split lists of keypoints shorter than a block."""
     rest = b""
     while block := file.read(_BLOCK_BYTES):
         rest += block
@@ -72,12 +72,12 @@ def _blocks(file: BinaryIO) -> Iterator[bytes]:
 
 
 def _arrays(texts: list[bytes]) -> list[np.ndarray]:
-    """Lists of numbers out of their text between the brackets; none where one is of other things too."""
+    """Arrays from the texts of lists; None if one contains anything but numbers."""
     lists = orjson.loads(b"[[" + b"],[".join(texts) + b"]]")
     if not set(map(type, chain.from_iterable(lists))) <= {int, float}:  # numpy would take True for 1
         return []
     ends = list(accumulate(map(len, lists)))
-    # Pages of their own, which go back to the system as soon as the lists are not needed any more.
+    # Memory pages of their own, which return to the system as soon as the lists are no longer needed.
     numbers = np.frombuffer(mmap(-1, max(8 * ends[-1], 1)), count=ends[-1])
     numbers[:] = np.fromiter(chain.from_iterable(lists), float, ends[-1])
     return np.split(numbers, ends[:-1])

@@ -1,4 +1,4 @@
-"""Whether the coordinates of a file can be pixels of its images, and its boxes x, y, width, height."""
+"""Checks that a file's coordinates are pixels of its images, and its boxes x, y, width, height."""
 
 from pathlib import Path
 
@@ -28,14 +28,14 @@ def refuse_fractions(path: Path | str, points_px: np.ndarray, what: str = "keypo
     path : Path or str
         The file or folder, for the message.
     points_px : array, shape (n, k, 2)
-        Of everybody in it; NaN, and 0, 0, where not given.
+        Of all people in it; NaN, and 0, 0, where missing.
     what : str, optional
         What they are, for the message.
 
     Raises
     ------
     InputError
-        If that is what all coordinates are of half of the people or more, who have three points at least.
+        If this holds for all coordinates of at least half of the people who have three points or more.
     """
     n_people, n_fractions, least = 0, 0, 0.0
     for of in (points_px[i : i + _AT_ONCE] for i in range(0, len(points_px), _AT_ONCE)):
@@ -55,7 +55,7 @@ def refuse_fractions(path: Path | str, points_px: np.ndarray, what: str = "keypo
 def corners_note(
     path: Path | str, boxes_px: np.ndarray, keypoints_px: np.ndarray, sizes_px: np.ndarray
 ) -> str:
-    """Refuse boxes that are x1, y1, x2, y2, and say where they could be.
+    """Refuse boxes given as x1, y1, x2, y2, and note where this is possible.
 
     Parameters
     ----------
@@ -71,12 +71,12 @@ def corners_note(
     Returns
     -------
     str
-        Empty where they cannot be corners.
+        Empty if they cannot be corners.
 
     Raises
     ------
     InputError
-        If as corners all of them fit images and people, and as x, y, width, height most leave the image, or
+        If all of them fit images and people as corners, while as x, y, width, height most leave the image, or
         ten end far beyond their people.
     """
     first, last = boxes_px[:, :2], boxes_px[:, 2:]
@@ -95,14 +95,14 @@ def corners_note(
 
 
 def beyond(points_px: np.ndarray, low_px: ArrayLike, high_px: ArrayLike) -> np.ndarray:
-    """Which points leave a range by more than rounding: a pixel.
+    """Which points exceed a range by more than a pixel, the tolerance for rounding.
 
     Parameters
     ----------
     points_px : array, shape (..., 2)
-        NaN leaves none.
+        NaN does not count.
     low_px, high_px : float or array, shape (..., 2)
-        Least and most of both coordinates.
+        Minimum and maximum of both coordinates.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def beyond(points_px: np.ndarray, low_px: ArrayLike, high_px: ArrayLike) -> np.n
 
 
 def doubts(boxes_px: np.ndarray, keypoints_px: np.ndarray, sizes_px: np.ndarray) -> str:
-    """What speaks against coordinates being pixels of the images, from their top left corner; else empty.
+    """Signs that coordinates are not pixels of the images from their top left corner; empty if none.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Files and pictures as they are, to look at before any number is computed."""
+"""Inspect files and images before evaluation."""

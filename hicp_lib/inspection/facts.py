@@ -1,4 +1,4 @@
-"""What is known of a file before it is used, in lines for people or as JSON."""
+"""Facts about a file, as text lines or JSON."""
 
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import BODY, FACE, HANDS, INDEX
 
 ORIGIN = "origin top left, pixel centres at integers"
-_FROM_ONE_SIDE = 0.7  # share of people whose left is on one side of the picture, from which on it is said
+_FROM_ONE_SIDE = 0.7  # fraction of people with left on one side of the image, from which it is reported
 _SIDES = ("mixed", "as of people facing the camera", "as of backs, or sides that are the picture's")
 _MOST_LINES = 10
 _EPOCH_S = (1e9, 4e9)  # times between these are seconds since 1970: 2001 to 2096
@@ -24,18 +24,18 @@ _EPOCH_S = (1e9, 4e9)  # times between these are seconds since 1970: 2001 to 209
 
 @dataclass(frozen=True)
 class Facts:
-    """What a file is.
+    """Facts about a file.
 
     Attributes
     ----------
     says : dict of str to str
-        What it holds: layout, units, scores, handedness, origin of pixels, times, counts.
+        Its content: layout, units, scores, handedness, origin of pixels, times, counts.
     notes : sequence of str
-        What is amiss, or assumed.
+        Problems and assumptions.
     needs : dict of str to str
-        By command that takes it, what that needs beside it; empty where nothing.
+        By command that takes it, what else that needs; empty if nothing.
     problem : str
-        Why it cannot be used; empty where it can.
+        Why it cannot be used; empty if it can.
     kind : str
         Of file, in a few words.
     path : str
@@ -57,7 +57,7 @@ class Facts:
     path: str = ""
 
     def lines(self) -> list[str]:
-        """For people, ten at most: what does not fit is counted."""
+        """At most ten text lines; further ones are counted."""
         needs = "; ".join(f"for {command}: {what or 'all is there'}" for command, what in self.needs.items())
         first = [f"{self.path}: {self.kind}", *(f"{what}: {value}" for what, value in self.says.items())]
         last = [line for line in (needs, self.problem and f"cannot be used: {self.problem}") if line]
@@ -75,7 +75,7 @@ def tables() -> dict:
 
 @contextmanager
 def under_name(path: Path, name: str) -> Iterator[Path]:
-    """A file under another name and alone in a folder, for readers that go by these.
+    """A file under another name, alone in a folder, for readers that depend on names.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def under_name(path: Path, name: str) -> Iterator[Path]:
     Yields
     ------
     Path
-        Messages of errors name the file itself in its place.
+        Error messages name the original file.
     """
     with TemporaryDirectory() as folder:
         other = Path(folder, name)
@@ -104,9 +104,9 @@ def about_people(keypoints_px: np.ndarray, of_person: str, origin: str = "") -> 
     keypoints_px : array, shape (n, 136, 2)
         NaN where not known.
     of_person : str
-        What keypoints are said to be.
+        Description of keypoints.
     origin : str, optional
-        What else there is to say of where pixels begin.
+        Remark on the origin of pixels.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def about_times(times_s: np.ndarray, meaning: str) -> str:
     times_s : array, shape (n,)
         In seconds.
     meaning : str
-        What they are times of.
+        What the times refer to.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""What a detector found, drawn over its pictures: PNG files, or one HTML page that needs nothing else.
+"""Detections drawn over images: PNG files, or one self-contained HTML page.
 
-Pictures come worst first: with annotations by the lowest OKS among their people (someone not found has 0),
-without by the lowest score of a person. Where nobody was found and nobody is known, a picture comes last.
+Images are sorted worst first: with annotations by the lowest OKS among their people (0 for a missed person),
+without by the lowest score of a person. Images without detected or annotated people come last.
 """
 
 import base64
@@ -25,25 +25,25 @@ from hicp_lib.formats.annotations import Annotations, rows_by_image
 from hicp_lib.formats.detection_files import read_rows
 from hicp_lib.inspection.skeletons import draw_people
 
-MAX_SIDE_PX = 960  # pictures of a page are not larger than this
-_TRUTH_COLOUR, _FOUND_COLOUR = "#E69F00", "#56B4E9"  # of Okabe and Ito: told apart by everybody
+MAX_SIDE_PX = 960  # images on a page are not larger than this
+_TRUTH_COLOUR, _FOUND_COLOUR = "#E69F00", "#56B4E9"  # of Okabe and Ito: colour-blind-safe
 _JPEG_QUALITY = 85
 Note = Callable[[str], object]
 
 
 @dataclass(frozen=True)
 class Picture:
-    """One image and who is in it.
+    """One image and its people.
 
     Attributes
     ----------
     path : Path
     found : Detections
-        What the detector gives.
+        The detections.
     truth : Detections or None
-        The people known to be in it, labelled keypoints with score 1; None without annotations.
+        The annotated people, labelled keypoints with score 1; None without annotations.
     oks : dict of str to list of float
-        By group, of every person who counts.
+        By group, of every evaluated person.
     """
 
     path: Path
@@ -53,12 +53,12 @@ class Picture:
 
     @property
     def quality(self) -> float:
-        """What pictures are sorted by: infinite where there is nobody."""
+        """The sort key of images: infinite without people."""
         values = sum(self.oks.values(), []) if self.truth is not None else self.found.person_scores.tolist()
         return min(values, default=np.inf)
 
     def line(self) -> str:
-        """What there is to say of it."""
+        """A description of it."""
         known = "" if self.truth is None else f"{len(self.truth)} annotated, "
         oks = [f"; OKS {group} {min(values):.2f}" for group, values in self.oks.items() if values]
         return f"{known}{len(self.found)} found{''.join(oks)}"
@@ -67,7 +67,7 @@ class Picture:
 def pictures(
     paths: Mapping[int, Path], found: Mapping[int, Detections], annotations: Annotations | None
 ) -> list[Picture]:
-    """The images with what is found and known in them, worst first.
+    """The images with detections and annotations, worst first.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def pictures(
     found : mapping of int to Detections
         By image id.
     annotations : Annotations or None
-        The truth, where it is known.
+        The annotations, if there are any.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def pictures(
 
 
 def _truth(people: Annotations) -> dict[int, Detections]:
-    """Who is known to be in each image, labelled keypoints with score 1."""
+    """The annotated people in each image, labelled keypoints with score 1."""
     labelled, rows = (people.visibility > 0).astype(float), rows_by_image(people.image_ids)
     known = {i: Detections(people.keypoints_px[of], labelled[of], np.ones(len(of))) for i, of in rows.items()}
     return {i: known.get(i, Detections.none()) for i in people.images}
@@ -105,16 +105,16 @@ def _truth(people: Annotations) -> dict[int, Detections]:
 def image_paths(
     detections: Path, images: Path, found: Mapping[int, Detections], annotations: Annotations | None
 ) -> dict[int, Path]:
-    """The picture of each image id: by the annotations, or by names that stand in or beside the detections.
+    """The file of each image id: by the annotations, or by names in or next to the detections.
 
     Parameters
     ----------
     detections : Path
-        Their file; a list of names may lie beside it, as `hicp detect` writes it.
+        Their file; a list of names may be next to it, as written by `hicp detect`.
     images : Path
         Folder of the pictures.
     found : mapping of int to Detections
-        What the file holds.
+        Its content.
     annotations : Annotations or None
 
     Returns
@@ -124,7 +124,7 @@ def image_paths(
     Raises
     ------
     InputError
-        If nothing says which picture an image id is, or a name leads out of the folder.
+        If the file of an image id is unknown, or a name leads out of the folder.
     """
     if not images.is_dir():
         raise InputError(f"{images}: is not a folder; give the folder that holds the pictures")
@@ -145,7 +145,7 @@ def image_paths(
 
 
 def write_pngs(chosen: list[Picture], out: Path, min_score: float, note: Note = print) -> None:
-    """Write the pictures with truth and detections drawn, numbered worst first.
+    """Write the images with annotations and detections drawn, numbered worst first.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def write_pngs(chosen: list[Picture], out: Path, min_score: float, note: Note = 
     min_score : float
         Detected keypoints below it are left out.
     note : callable, optional
-        Told of every picture that cannot be shown, one line each.
+        Called for every image that cannot be shown, one line each.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def write_pngs(chosen: list[Picture], out: Path, min_score: float, note: Note = 
 
 
 def write_page(chosen: list[Picture], out: Path, title: str, note: Note = print) -> None:
-    """Write one HTML file with the pictures in it, and a slider for the least score.
+    """Write one HTML file with the images in it, and a slider for the minimum score.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def write_page(chosen: list[Picture], out: Path, title: str, note: Note = print)
     out : Path
     title : str
     note : callable, optional
-        Told of every picture that cannot be shown, one line each.
+        Called for every image that cannot be shown, one line each.
 
     Raises
     ------
@@ -222,7 +222,7 @@ def _row(picture: Picture, image: np.ndarray) -> dict:
 
 
 def _points(people: Detections) -> list[list[list[float]]]:
-    """Of every person, the keypoints that are given: index, u, v, score."""
+    """For every person, the given keypoints: index, u, v, score."""
     given = np.isfinite(people.keypoints_px).all(axis=-1) & (people.scores > 0)
     rows = zip(people.keypoints_px.round(1).tolist(), people.scores.round(3).tolist(), given, strict=True)
     return [[[int(k), *uv[k], of[k]] for k in np.flatnonzero(shown)] for uv, of, shown in rows]

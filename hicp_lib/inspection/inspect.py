@@ -1,4 +1,4 @@
-"""What a file or a folder is, of the kinds in `data/kinds.toml`, by its content: its name is not believed."""
+"""Identify a file or a folder, among the kinds in `data/kinds.toml`, by its content and not by its name."""
 
 import re
 from dataclasses import replace
@@ -14,7 +14,7 @@ from hicp_lib.inspection.facts import Facts, tables, under_name
 from hicp_lib.recordings.tum import names_poses
 
 _HEAD_BYTES, _HEAD_LINES = 8192, 40
-_PRINTED = {*b"\t\r\n\f\x1a", *range(32, 256)}  # what texts are made of, in any code page
+_PRINTED = {*b"\t\r\n\f\x1a", *range(32, 256)}  # characters of texts, in any code page
 _NUMBER = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?", re.IGNORECASE)
 
 
@@ -33,17 +33,17 @@ def identify(path: Path) -> tuple[Kind, Path]:
     -------
     Kind
     path : Path
-        What to describe: of a folder that holds nothing else, its JSON file.
+        What to describe: for a folder with a single JSON file, that file.
 
     Raises
     ------
     InputError
-        If it cannot be read, or is of no kind that is known.
+        If it cannot be read, or is of an unknown kind.
     """
     if path.is_dir():
         return _folder(path)
     if not path.is_file():
-        raise InputError(f"{path}: is no file and no folder; check the path")
+        raise InputError(f"{path}: is neither a file nor a folder; check the path")
     with open(path, "rb") as file:
         head = file.read(_HEAD_BYTES)
     for kind in tables()["kind"]:
@@ -76,7 +76,7 @@ def _json(path: Path) -> Kind:
 
 
 def _marks_of_results(rows: list[dict]) -> set[str]:
-    """A name for an id is AlphaPose's way; flags, with -1, -1, 0 for what was not found, are OpenPose's."""
+    """Names as ids are typical of AlphaPose; flags, with -1, -1, 0 for missing keypoints, of OpenPose."""
     flat = [row["keypoints"] for row in rows if isinstance(row["keypoints"], list)]
     are_flags = all(value in (0, 1) for of in flat for value in of[2::3])
     are_flags = are_flags and any(of[i : i + 3] == [-1, -1, 0] for of in flat for i in range(0, len(of), 3))
@@ -84,7 +84,7 @@ def _marks_of_results(rows: list[dict]) -> set[str]:
 
 
 def _marks_of_text(path: Path, head: str) -> set[str]:
-    """Columns of the first line, and what the first rows are made of."""
+    """Columns of the first line, and types of the first rows."""
     lines = [line.strip() for line in head.splitlines()[:_HEAD_LINES] if line.strip()]
     rows = [[bool(_NUMBER.fullmatch(word)) for word in line.split()] for line in lines if line[0] != "#"]
     marks = {name.strip(' "') for name in lines[0].split(",")}
@@ -118,12 +118,12 @@ def inspect(path: str | Path) -> Facts:
     Returns
     -------
     Facts
-        With `problem` where the kind is known and the content cannot be used.
+        With `problem` if the kind is known but the content cannot be used.
 
     Raises
     ------
     InputError
-        If it cannot be read, or is of no kind that is known.
+        If it cannot be read, or is of an unknown kind.
     """
     kind, path = identify(Path(path))
     try:

@@ -1,4 +1,4 @@
-"""What annotations and detections hold."""
+"""Describe annotations and detections."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,7 +28,7 @@ def describe_predictions(path: Path, tool: str, origin: str = "") -> Facts:
     tool : str
         A key of `hicp_lib.formats.importers.importing.READERS`.
     origin : str, optional
-        What there is to say of where pixels begin.
+        Remark on the origin of pixels.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def describe_predictions(path: Path, tool: str, origin: str = "") -> Facts:
 
 
 def _scores(tool: str, people: People) -> tuple[str, dict[str, str]]:
-    """Range and scale of keypoint scores in words, and what `hicp import` must be told of it."""
+    """Range and scale of keypoint scores in words, and the option that `hicp import` needs."""
     raw = people.raw_scores[np.isfinite(people.keypoints_px).all(axis=-1)]
     if set(raw.tolist()) <= {0.0, 1.0}:
         return ("0 and 1 only: whether found, no scores" if len(raw) else "none"), {}

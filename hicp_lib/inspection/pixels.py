@@ -1,4 +1,4 @@
-"""What pictures, videos, sets of them and networks are."""
+"""Describe images, videos, sets of them and networks."""
 
 import zipfile
 from collections import Counter
@@ -19,14 +19,14 @@ from hicp_lib.detectors.runtime.to_file import IMAGE_SUFFIXES
 from hicp_lib.inspection.facts import Facts, about_times
 from hicp_lib.inspection.people import describe_annotations
 
-_MOST_HEADERS = 2000  # of images of a folder that are looked into
+_MOST_HEADERS = 2000  # number of images of a folder that are examined
 
 
 def describe_image(path: Path) -> Facts:
     """Say what a picture is; its pixels are read to the end."""
     refuse_too_large(path, *image_header(path)[:2])
     with Image.open(path) as image:
-        values = np.asarray(image)  # to the end: what is cut off is told
+        values = np.asarray(image)  # to the end, to find truncated files
     says = {"size": f"{image.width} x {image.height} pixels, {image.mode}"}
     if image.mode.startswith("I"):
         middle = np.median(values[values > 0]) if values.any() else 0

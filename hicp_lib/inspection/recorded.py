@@ -1,4 +1,4 @@
-"""What recordings hold, and files of them: bags, cameras, trajectories, motion capture."""
+"""Describe recordings and their files: bags, cameras, trajectories, motion capture."""
 
 from collections.abc import Iterable
 from dataclasses import asdict

@@ -1,4 +1,4 @@
-"""Keypoints and limbs drawn onto pictures."""
+"""Draw keypoints and limbs onto images."""
 
 import cv2
 import numpy as np

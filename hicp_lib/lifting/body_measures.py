@@ -1,7 +1,7 @@
-"""What is known of people before they are seen: how keypoints hang together, how far apart they can be.
+"""Prior knowledge of people: how keypoints are connected, and how far apart they can be.
 
-Measured on the body model by `tools/measure_body.py`, over the bodies for development in many poses. No
-recording and nobody who is held out had a part in it.
+Measured on the body model by `tools/measure_body.py`, over the development bodies in many poses. No recording
+and no held-out identity was used.
 """
 
 from dataclasses import dataclass
@@ -17,8 +17,8 @@ from hicp_lib.core.memo import memoised
 MEASURES_FILE = DATA_DIR / "body_measures.npz"
 _WRISTS = [INDEX["left_wrist"], INDEX["right_wrist"]]
 _KNUCKLES = np.concatenate([hand[[5, 9, 13, 17]] for hand in (LEFT_HAND, RIGHT_HAND)])
-# Chosen on development people. The measured body is bare; and seen from the front, its hanging hands turn
-# their edges to the camera, others their backs.
+# Chosen on development identities. The measured body is undressed; and seen from the front, its hanging hands
+# show their edges to the camera, other people's hands their backs.
 _SLEEVE_M, _BACK_OF_HAND_M = 0.010, 0.011
 
 
@@ -35,7 +35,7 @@ def _parents() -> np.ndarray:
 
 
 PARENTS = _parents()
-"""The keypoint each one hangs on, shape (136,), -1 for the root: a tree from the right shoulder outwards."""
+"""The parent of each keypoint, shape (136,), -1 for the root: a tree from the right shoulder outwards."""
 
 
 def _level(keypoint: int) -> int:
@@ -43,7 +43,7 @@ def _level(keypoint: int) -> int:
 
 
 LEVELS = np.array([*map(_level, range(N_KEYPOINTS))])
-"""How many keypoints each one is away from the root, shape (136,)."""
+"""Depth of each keypoint in the tree, shape (136,)."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class BodyMeasures:
     Attributes
     ----------
     below_skin_m : array, shape (136,)
-        How deep the keypoint lies below the surface that is seen from the front, sleeves included.
+        Depth of the keypoint below the surface seen from the front, including sleeves.
     closest_m, farthest_m : array, shape (136, 136)
-        Least and most distance between two keypoints.
+        Minimum and maximum distance between two keypoints.
     """
 
     below_skin_m: np.ndarray
@@ -96,7 +96,7 @@ def load_measures(path: Path = MEASURES_FILE) -> BodyMeasures:
 
 
 def found_parents(found: np.ndarray) -> np.ndarray:
-    """Which found keypoint each found keypoint hangs on, when those between are not found.
+    """The nearest detected ancestor of each detected keypoint.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def found_parents(found: np.ndarray) -> np.ndarray:
     Returns
     -------
     array of int, shape (n,)
-        Index into `found`, -1 for those that hang on none.
+        Index into `found`, -1 for those without one.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Surfaces seen around keypoints as candidates for their depth, and what each depth costs."""
+"""Surfaces seen around keypoints as candidates for their depth, and the cost of each depth."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RADIUS_M = np.where(_IS_BODY, 0.022, 0.013)  # how far around a keypoint surface
 _SIGMA_M = np.where(_IS_BODY, 0.010, 0.008)  # depths that differ so much cost 1
 _SIGMA_M[[INDEX["left_wrist"], INDEX["right_wrist"]]] = 0.015
 _SAMPLES = 7  # per side of the neighbourhood
-_STEEP_M = 0.03  # a larger difference between the pixels on both sides is a depth step
+_STEEP_M = 0.03  # a larger difference between the pixels on both sides is a step in depth
 _ON_STEP = 1.0  # cost of a surface there
 _HIDDEN = np.where(_IS_BODY, 5.0, 2.0)  # cost of lying behind the nearest surface
 _IN_FRONT = 20.0  # and in front of it
@@ -25,16 +25,16 @@ _IN_FRONT = 20.0  # and in front of it
 
 @dataclass(frozen=True)
 class Candidates:
-    """Depths that m keypoints of a person may have by what is seen around them.
+    """Candidate depths of m keypoints of a person, from the surfaces seen around them.
 
     Attributes
     ----------
     rays : array, shape (m, 3)
         Lines of sight in the camera frame, z = 1.
     depth_m : array, shape (m, k)
-        The keypoint's below each surface sampled; NaN where none was.
+        The keypoint's depth below each sampled surface; NaN where there was none.
     cost : array, shape (m, k)
-        0 at the keypoint, 1 at the neighbourhood's edge, more on depth steps.
+        0 at the keypoint, 1 at the neighbourhood's edge, more at steps in depth.
     keypoints : array of int, shape (m,)
         Which they are, Halpe order.
     """
@@ -46,11 +46,11 @@ class Candidates:
 
     @property
     def sigma_m(self) -> np.ndarray:
-        """Depths that differ so much cost 1, shape (m,)."""
+        """Differences of depth that cost 1, shape (m,)."""
         return _SIGMA_M[self.keypoints]
 
     def take(self, rows: np.ndarray) -> Candidates:
-        """Those of some keypoints.
+        """The candidates of some keypoints.
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ def depth_candidates(
     intrinsics: Camera,
     below_m: np.ndarray,
 ) -> Candidates:
-    """Candidates of keypoints that lie in the image: the surfaces seen around them.
+    """Candidates of keypoints in the image: the surfaces seen around them.
 
     Parameters
     ----------
@@ -80,12 +80,12 @@ def depth_candidates(
     pixels_px : array, shape (m, 2)
         (u, v).
     near_m : array, shape (m,)
-        About how far away; sets the neighbourhood's size in pixels.
+        Approximate distance; determines the neighbourhood's size in pixels.
     depth_m : array, shape (height, width)
         Depth along the camera's z axis; 0, NaN or infinite: none.
     intrinsics : Camera
     below_m : array, shape (136,)
-        How deep keypoints lie below the surface.
+        Depths of keypoints below the surface.
 
     Returns
     -------
@@ -119,15 +119,14 @@ def depth_candidates(
 
 
 def depth_costs(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
-    """What each depth costs each keypoint: the least over what explains it.
+    """The cost of each depth for each keypoint: the minimum over its explanations.
 
-    It is on the line of sight of a surface sampled, or hidden behind one; in front of all of them it
-    would be seen.
+    The keypoint is at a sampled surface, or hidden behind one; in front of all of them it would be seen.
 
     Parameters
     ----------
     candidates : Candidates
-        Of m keypoints, each with a depth at least.
+        Of m keypoints, each with at least one depth.
     grid_m : array, shape (g,)
         Depths, evenly spaced.
 
@@ -136,11 +135,11 @@ def depth_costs(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
     array, shape (m, g)
     """
     nearest_m = np.nanmin(candidates.depth_m, axis=1)
-    beyond_m = np.concatenate([[np.inf], grid_m, [np.inf]])  # what is not on the grid ends up at its ends
+    beyond_m = np.concatenate([[np.inf], grid_m, [np.inf]])  # values off the grid go to its ends
     costs = np.where(beyond_m > nearest_m[:, None], _HIDDEN[candidates.keypoints, None], _IN_FRONT)
     keypoint, sample = np.nonzero(np.isfinite(candidates.depth_m))
     depth_m, cost = candidates.depth_m[keypoint, sample], candidates.cost[keypoint, sample]
-    # A surface explains only depths near it for less than `_IN_FRONT`.
+    # A surface explains only nearby depths at a cost below `_IN_FRONT`.
     step_m = grid_m[1] - grid_m[0]
     reach = int(np.sqrt(_IN_FRONT) * candidates.sigma_m.max(initial=0) / step_m + 0.5)
     nearest = np.rint((depth_m - grid_m[0]) / step_m).astype(int) + 1
@@ -154,7 +153,7 @@ def depth_costs(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
 def refine_depths(
     candidates: Candidates, chosen_m: np.ndarray, grid_step_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The weighted mean of the candidates that agree with depths chosen on a grid.
+    """Refine depths chosen on a grid: the weighted mean of the candidates that agree.
 
     Without any, the keypoint is not seen, and the grid's depth remains.
 
@@ -180,10 +179,10 @@ def refine_depths(
 
 
 def _sample(depth_m: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Depth at pixels, NaN where there is none, and whether there is a depth step or a hole beside them."""
+    """Depth at pixels, NaN where missing, and whether there is a step or hole next to them."""
     height, width = depth_m.shape
     is_inside = inside(np.stack([columns, rows], axis=-1), (0, 0, width, height))
-    # One pixel in from the border, so that there are pixels on all sides.
+    # One pixel inside the border, so that there are pixels on all sides.
     rows, columns = np.clip(rows, 1, height - 2), np.clip(columns, 1, width - 2)
     surface_m = depth_m[rows, columns]
     across = abs(depth_m[rows, columns + 1] - depth_m[rows, columns - 1])

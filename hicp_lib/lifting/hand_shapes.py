@@ -1,13 +1,13 @@
-"""Hands as a whole: where fingers are that others hide, from the shapes a hand can take.
+"""Depths of occluded fingers, from the shapes that a hand can take.
 
-In the image a finger behind the hand is often found where it is, but what is seen there is the hand in
-front of it. The palm is rigid and fingers bend in known ways: of many turns and sizes of the palm those are
-kept that fit its keypoints in the image and what is seen there, and on each of them every finger takes the
-bends that fit best. The mean of the good ones, weighted by how well they fit, is where the joints are; it
-decides on those that have some other part of the hand before them, the rest are where they are seen.
+A finger behind the hand is often detected at the correct pixel, but the depth there is that of the hand in
+front of it. The palm is rigid, and fingers bend in known ways. Of many rotations and sizes of the palm, those
+are kept that fit its keypoints in the image and the depth there; for each of them, every finger takes the
+bends that fit best. The weighted mean of the good fits gives the joints' depths. It is used for joints that
+have another part of the hand in front of them; the others stay where they are seen.
 
-The shapes are the body model's with fingers bent at random (`tools/measure_hands.py`). Rendered people have
-hands of this model too, in other sizes; hands of real people differ more from it.
+The shapes are those of the body model, with randomly bent fingers (`tools/measure_hands.py`). Rendered people
+have hands of this model too, in other sizes; hands of real people differ more from it.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from hicp_lib.core.rotations import matrices_from_quaternions
 
 SHAPES_FILE = DATA_DIR / "hand_shapes.npz"
 PALM = np.array([0, 5, 9, 13, 17])
-"""Keypoints of a hand that do not move against each other: its root and the knuckles."""
+"""Keypoints of a hand that are rigidly connected: its root and the knuckles."""
 FINGERS = (np.arange(1, 5), *(np.arange(knuckle + 1, knuckle + 4) for knuckle in PALM[1:]))
-"""The keypoints of each finger that do, thumb first."""
+"""The moving keypoints of each finger, thumb first."""
 _FINGER_OF = np.where(np.isin(np.arange(21), PALM), -1, (np.arange(21) - 1) // 4)
 
 _LEAST_OF_PALM = 4  # fewer of it found do not tell how it is turned
@@ -43,7 +43,7 @@ _BESIDE_M, _BEHIND_M = 0.015, 0.010  # a keypoint so near a limb in the image, s
 
 @memoised()
 def load_hand_shapes(path: Path = SHAPES_FILE) -> np.ndarray:
-    """Right hands about the middle of the palm, palms turned alike.
+    """Right hands centred at the palm, with equally oriented palms.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def load_hand_shapes(path: Path = SHAPES_FILE) -> np.ndarray:
 def with_hand_shapes(
     costs: np.ndarray, grid_m: np.ndarray, rays: np.ndarray, found: np.ndarray
 ) -> np.ndarray:
-    """Costs of depths; for what a hand hides, other depths than its shape gives cost more.
+    """Costs of depths, raised for hidden keypoints of a hand at depths that disagree with its shape.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def with_hand_shapes(
 def fit_hand(
     costs: np.ndarray, grid_m: np.ndarray, rays: np.ndarray, which: np.ndarray, is_right: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Depths of a hand's keypoints, and how far the good fits disagree.
+    """Depths of a hand's keypoints, and the spread of the good fits.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def fit_hand(
 
 
 def hidden_by_limbs(slopes: np.ndarray, depth_m: np.ndarray, which: np.ndarray) -> np.ndarray:
-    """Which keypoints of a hand lie behind a limb of it that they are no end of.
+    """Which keypoints of a hand lie behind one of its limbs that they do not belong to.
 
     Parameters
     ----------
@@ -170,20 +170,20 @@ def hidden_by_limbs(slopes: np.ndarray, depth_m: np.ndarray, which: np.ndarray) 
 
 @dataclass(frozen=True)
 class _SeenHand:
-    """What is known of k keypoints of a hand, float32.
+    """Observations of k keypoints of a hand, float32.
 
     Attributes
     ----------
     which : array of int, shape (k,)
         Their numbers in the hand.
     middle_m : array, shape ()
-        How far away the palm's middle seems to be.
+        Apparent distance of the palm's centre.
     places_m : array, shape (2, k)
-        Where they are seen, measured at that depth.
+        Their positions across the line of sight, at that depth.
     grid_m : array, shape (g,)
         Depths behind it.
     costs : array, shape (k, g)
-        What they cost.
+        The costs of these depths.
     """
 
     which: np.ndarray
@@ -196,14 +196,14 @@ class _SeenHand:
         return replace(self, which=self.which[some], places_m=self.places_m[:, some], costs=self.costs[some])
 
     def apart_m(self, points_m: np.ndarray) -> np.ndarray:
-        """How far from where they are seen points (3, k, ...) about the middle appear, (2, k, ...)."""
+        """Offsets (2, k, ...) of projected points (3, k, ...) from the observed positions."""
         scale = 1 / (1 + points_m[2] / self.middle_m)
         return _beside(self.places_m, points_m) - points_m[:2] * scale
 
     def look_up(self, behind_m: np.ndarray) -> np.ndarray:
-        """What depths (k, ...) behind the middle cost."""
+        """Costs of depths (k, ...) behind the centre."""
         per_m, last = 1 / (self.grid_m[1] - self.grid_m[0]), len(self.grid_m) - 1
-        place = behind_m - self.grid_m[0]  # in place from here on, as memory is what takes the time
+        place = behind_m - self.grid_m[0]  # in place from here on, as memory access dominates the time
         place *= per_m
         np.clip(np.rint(place, out=place), 0, last, out=place)
         place += _beside(np.arange(len(self.costs), dtype=np.float32) * (last + 1), behind_m)
@@ -212,9 +212,9 @@ class _SeenHand:
 
 @memoised()
 def _turns(is_right: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Turns of the palm times its size, what the size costs, and where its keypoints are then.
+    """Rotations of the palm times its size, the cost of the size, and the resulting keypoints.
 
-    Shapes (n, 3, 3), (n,) and (3, 5, n); left hands are mirrored. Even over all turns:
+    Shapes (n, 3, 3), (n,) and (3, 5, n); left hands are mirrored. Evenly distributed over all rotations:
     super-Fibonacci spirals (Alexa, "Super-Fibonacci Spirals", CVPR 2022).
     """
     share = (np.arange(_N_TURNS) + 0.5) / _N_TURNS
@@ -230,10 +230,10 @@ def _turns(is_right: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _place_palm(seen: _SeenHand, is_right: bool) -> tuple[np.ndarray, ...]:
-    """The palms that fit: what they cost, (p,), and how deep their keypoints lie (as of `_bend`), (k, p).
+    """The palms that fit: their costs, (p,), and the depths of their keypoints (as in `_bend`), (k, p).
 
-    Then their turns times the size, (p, 3, 3), how far their middles lie behind where they seem to be, (p,),
-    and across the line of sight, (2, p).
+    Then their rotations times the size, (p, 3, 3), and the offsets of their centres from the apparent centre,
+    in depth, (p,), and across the line of sight, (2, p).
     """
     turns, total, points_m = _turns(is_right)
     points_m = points_m[:, np.searchsorted(PALM, seen.which)]
@@ -253,10 +253,9 @@ def _place_palm(seen: _SeenHand, is_right: bool) -> tuple[np.ndarray, ...]:
 def _bend(
     seen: _SeenHand, turns: np.ndarray, z_m: np.ndarray, shift_m: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fingers on each palm: what they cost in their best shapes, (p,), and how deep they lie, (k, p).
+    """Fingers on each palm: their costs in the best shapes, (p,), and their depths, (k, p).
 
-    That is behind where the middle seems to be, in the mean over shapes by how well they fit; and the mean
-    of its square.
+    Depths are relative to the apparent centre: the weighted mean over shapes, and the mean of the square.
     """
     shapes_m = load_hand_shapes()[:, seen.which].swapaxes(0, 1)
     points_m = _turned(shapes_m.reshape(-1, 3), turns).reshape(3, *shapes_m.shape[:2], -1)
@@ -274,10 +273,10 @@ def _bend(
 
 
 def _turned(points_m: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Points (k, 3) under every turn (p, 3, 3), shape (3, k, p)."""
+    """Points (k, 3) under every rotation (p, 3, 3), shape (3, k, p)."""
     return points_m @ turns.transpose(1, 2, 0)
 
 
 def _beside(values: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Values of keypoints with axes appended until they go with arrays of points."""
+    """Values of keypoints with axes appended, to broadcast with arrays of points."""
     return values[(..., *[None] * (points.ndim - values.ndim))]

@@ -1,4 +1,4 @@
-"""Depths of all keypoints of a person chosen together, so that limbs have lengths that people have."""
+"""Choose the depths of all keypoints of a person jointly, so that limbs have plausible lengths."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,25 +8,26 @@ import numpy as np
 from hicp_lib.core.keypoints import LEFT_HAND
 from hicp_lib.lifting.body_measures import LEVELS, BodyMeasures, found_parents
 
-# A limb longer or shorter than people's by a share of its length and some more costs 1, and so on with the
-# square up to a most. Limbs of the body seen too short are often the detector's fault; hands are rigid.
+# A limb that is longer or shorter than people's by a fraction of its length plus a constant costs 1; the cost
+# grows with the square up to a maximum. Limbs of the body that appear too short are often the detector's
+# error; hands are rigid.
 _MOST_LONG = 40.0
-_ALIKE = 20  # limbs whose reach falls into the same so many steps are worked out together
+_ALIKE = 20  # limbs whose reach falls into the same interval of steps are computed together
 _BODY, _HAND = np.array([0.02, 0.005, 4.0]), np.array([0.03, 0.006, 20.0])  # share, more_m, most_short
 
 
 @dataclass(frozen=True)
 class Limbs:
-    """Some limbs that are equally far from the root.
+    """Limbs at the same depth of the tree.
 
     Attributes
     ----------
     begin, end : array of int, shape (n,)
         Rows of the keypoints at their ends, `begin` nearer to the root.
     costs : array, shape (n, g, g)
-        What their lengths cost, by the depth of the beginning and then of the end.
+        Costs of their lengths, by the depth of the beginning and then of the end.
     reach : int
-        Steps of depth after which all of them are too long by the most that costs.
+        Steps of depth beyond which all of them have the maximum cost.
     """
 
     begin: np.ndarray
@@ -70,7 +71,7 @@ def limbs_outwards(
 
 
 def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> tuple[np.ndarray, np.ndarray]:
-    """The depths that cost least in all, and what any other depth of a keypoint costs at least.
+    """The depths with the lowest total cost, and the lowest total cost with any other depth of a keypoint.
 
     The sum over keypoints and limbs is minimised exactly along the tree of limbs, from their ends to the
     root and back (dynamic programming, as in Felzenszwalb and Huttenlocher, "Pictorial Structures for
@@ -81,14 +82,14 @@ def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> tuple[np.nd
     costs : array, shape (m, g)
         Of each keypoint at each depth of the limbs' grid.
     limbs : sequence of Limbs
-        From the root outwards, as `limbs_outwards` gives them.
+        From the root outwards, as from `limbs_outwards`.
 
     Returns
     -------
     chosen : array of int, shape (m,)
         Index into the grid.
     in_all : array, shape (m, g)
-        The least sum with that keypoint at that depth (min-marginals).
+        The lowest sum with that keypoint at that depth (min-marginals).
 
     Examples
     --------
@@ -103,11 +104,11 @@ def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> tuple[np.nd
     for some in limbs[::-1]:
         told.append((some.costs + costs[some.end][:, None]).min(axis=2))
         np.add.at(costs, some.begin, told[-1])
-    chosen = costs.argmin(axis=1)  # which counts for those that hang on none
+    chosen = costs.argmin(axis=1)  # used for those without a parent
     for some, told_of in zip(limbs, told[::-1], strict=True):
         ends, begin = costs[some.end], chosen[some.begin]
         total = some.costs[np.arange(len(begin)), begin] + ends
-        # Of depths that are equally good, rather one that a limb all but reaches.
+        # Among equally good depths, prefer one that a limb nearly reaches.
         total[abs(np.arange(costs.shape[1]) - begin[:, None]) > some.reach] = np.inf
         is_near = total.min(axis=1) <= ends.min(axis=1) + _MOST_LONG
         chosen[some.end] = np.where(is_near, total.argmin(axis=1), ends.argmin(axis=1))
@@ -117,7 +118,7 @@ def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> tuple[np.nd
 
 
 def out_of_reach(chosen: np.ndarray, limbs: Sequence[Limbs]) -> np.ndarray:
-    """Which ends of limbs are so far from their beginnings that nobody's limb reaches.
+    """Which ends of limbs are farther from their beginnings than any limb is long.
 
     Parameters
     ----------
@@ -137,8 +138,7 @@ def out_of_reach(chosen: np.ndarray, limbs: Sequence[Limbs]) -> np.ndarray:
 
 
 def _limits(pairs: np.ndarray, measures: BodyMeasures) -> np.ndarray:
-    """Of n limbs, (4, n, 1, 1): least and most length, what more or less than that costs 1, and how many
-    times that counts when it is too short (its root)."""
+    """Of n limbs, (4, n, 1, 1): minimum and maximum length, excess costing 1, root of the weight if short."""
     most_m = measures.farthest_m[*pairs]
     share, more_m, most_short = np.where(pairs[1] >= LEFT_HAND[0], _HAND[:, None], _BODY[:, None])
     limits = measures.closest_m[*pairs], most_m, share * most_m + more_m, np.sqrt(most_short)
@@ -146,14 +146,14 @@ def _limits(pairs: np.ndarray, measures: BodyMeasures) -> np.ndarray:
 
 
 def _length_costs(grid_m: np.ndarray, rays: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """What the distances between n pairs of keypoints cost, (n, g, g), float32.
+    """Costs of the distances between n pairs of keypoints, (n, g, g), float32.
 
     `rays` (2, n, 3) are the lines of sight, `limits` as of `_limits`.
     """
     grid_m, (begin, end) = grid_m.astype(np.float32), rays.astype(np.float32)
     aa, bb, ab = ((a * b).sum(axis=1)[:, None, None] for a, b in ((begin, begin), (end, end), (begin, end)))
     begin_m, (least_m, most_m, sigma_m, most_short) = grid_m[:, None], limits
-    values = bb * grid_m - 2 * ab * begin_m  # from here on in place, as memory is what takes the time
+    values = bb * grid_m - 2 * ab * begin_m  # from here on in place, as memory access dominates the time
     values *= grid_m
     values += aa * begin_m**2
     length_m = np.sqrt(np.maximum(values, 0, out=values), out=values)

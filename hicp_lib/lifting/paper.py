@@ -1,19 +1,19 @@
-"""From image keypoints and a depth image to points in space, as the paper does it (section III-B).
+"""Lift image keypoints with a depth image to points in space by the paper's method (section III-B).
 
-Around a keypoint lies a square neighbourhood: the pixels no further than fx r / d in u and in v from
-the pixel the keypoint lies on, d being the depth there. r is 20 mm for body and feet, 3 mm for face
-and hands. Every pixel of it that has a depth is lifted, x = d (u - cx) / fx, y = d (v - cy) / fy, z = d,
-and the point is the median of each coordinate.
+The neighbourhood of a keypoint is a square: the pixels within fx r / d, in u and in v, of the keypoint's
+pixel, with d the depth there. r is 20 mm for body and feet, 3 mm for face and hands. Every pixel of it that
+has a depth is lifted, x = d (u - cx) / fx, y = d (v - cy) / fy, z = d, and the point is the median of each
+coordinate.
 
 What the paper leaves open is defined here:
 
-- r is half the side of the square, where its words allow the whole.
-- Where the keypoint's own pixel has no depth, the nearest pixel whose own depth sets a neighbourhood
-  that reaches the keypoint decides the size; without any the keypoint is not lifted.
-- At the image's border the neighbourhood is what lies inside. A keypoint outside the image, beyond the
+- r is half the side of the square, though the paper's words could also mean the whole side.
+- If the keypoint's own pixel has no depth, the size follows from the nearest pixel whose own neighbourhood
+  would include the keypoint; if there is none, the keypoint is not lifted.
+- At the image's border the neighbourhood is the part inside. A keypoint outside the image, beyond the
   outer edges of its pixels, is not lifted.
-- At a depth step the side with more pixels wins, also where the keypoint lies on the other one; each
-  coordinate on its own, so with sides of equal size the point may lie between them.
+- At a step in depth the side with more pixels wins, even if the keypoint lies on the other one. Each
+  coordinate is treated separately, so with sides of equal size the point may lie between them.
 - A keypoint that is not detected (NaN) is not lifted.
 """
 
@@ -31,10 +31,10 @@ RADIUS_M = np.full(N_KEYPOINTS, 0.003)
 RADIUS_M[BODY] = BODY_RADIUS_M
 
 REASONS = ("lifted", "not_detected", "outside_image", "no_depth", "guessed")
-"""What `Lifted.reason` counts: lifted to a depth that is seen, or why not; guessed has a depth not seen."""
+"""Meanings of `Lifted.reason`: lifted to a seen depth, or why not; "guessed" has a depth not seen."""
 LIFTED, NOT_DETECTED, OUTSIDE_IMAGE, NO_DEPTH, GUESSED = range(5)
 
-MIN_DEPTH_M = 0.1  # nearer than depth cameras measure; bounds the neighbourhood
+MIN_DEPTH_M = 0.1  # below the range of depth cameras; limits the neighbourhood
 
 _BLOCK = 1 << 20  # pixels gathered at a time
 
@@ -61,7 +61,7 @@ class Lifted:
 def lift(
     keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera, radius_m: np.ndarray | float = RADIUS_M
 ) -> Lifted:
-    """Lift the keypoints of everyone in an image by the paper's method; this module's head defines it.
+    """Lift the keypoints of all people in an image by the paper's method, defined in this module's docstring.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def lift(
     intrinsics : Camera
         Of that image.
     radius_m : float or array, shape (136,), optional
-        r, of all keypoints or of each.
+        r, one for all keypoints or one for each.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def lift(
     Raises
     ------
     ValueError
-        If the shapes are not these.
+        If shapes do not match.
 
     Examples
     --------

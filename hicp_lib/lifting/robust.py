@@ -1,40 +1,40 @@
-"""Lifting beyond the paper: joints instead of skin, what is seen near a keypoint, limbs of human length.
+"""Robust lifting: joints instead of skin, surfaces near a keypoint, limbs of plausible length.
 
-The paper's method (`hicp_lib.lifting.paper`) reads the depth of whatever fills most of a keypoint's
-neighbourhood. What exact truth shows to go wrong with it, and the steps here that mend it:
+The paper's method (`hicp_lib.lifting.paper`) takes the depth of the surface that fills most of a keypoint's
+neighbourhood. Its errors, as seen with exact ground truth, and the steps that correct them:
 
-- It gives the skin, not the joint in the middle of the limb. *below_surface*: a keypoint is put as far
-  behind what is seen, along the line of sight, as it lies below the skin of the body model.
-- It takes background beside thin limbs, and flying pixels between two surfaces. *near_surfaces*: every
-  surface around the keypoint is a candidate, which costs more the further from the keypoint it is seen, and
-  on depth steps; the depth is the mean over the part of the neighbourhood that agrees with the cheapest.
-- It takes what hides a joint, and what is beside a limb that the detector missed. *limb_lengths*: depths
-  of all keypoints are chosen together, so that they cost least while limbs have lengths that people have.
-  Then a joint may also lie behind what is seen, at a cost.
-  A joint whose limb comes towards the camera is hidden by it, and lies deeper than below the skin alone.
-- It takes the front of a hand for the fingers behind it. *hand_shapes*: of the hand that fits best, palm and
-  bent fingers, what lies behind another part of it is drawn to the depth it has there.
+- It gives the skin, not the joint inside the limb. *below_surface*: a keypoint is moved behind the visible
+  surface, along the line of sight, by its depth below the skin in the body model.
+- It takes the background next to thin limbs, and flying pixels between two surfaces. *near_surfaces*: every
+  surface around the keypoint is a candidate, whose cost grows with its distance from the keypoint in the
+  image and at steps in depth; the depth is the mean over the part of the neighbourhood that agrees with the
+  candidate of lowest cost.
+- It takes the surface that occludes a joint, or the one next to a limb that the detector missed.
+  *limb_lengths*: the depths of all keypoints are chosen jointly, with the lowest cost and plausible limb
+  lengths. A joint may then also lie behind the visible surface, at a cost. A joint whose limb points at the
+  camera is occluded by it, and lies deeper than its depth below the skin.
+- It takes the front of a hand for the fingers behind it. *hand_shapes*: palm and bent fingers are fitted, and
+  keypoints behind another part of the hand are drawn to their depth in the fitted shape.
 
-Tried as well and left out, as they brought nothing: the mode of depth around the keypoint instead of the
-cheapest candidate, scores of the detector as weights of limbs, the person's true size for the limbs'
-lengths instead of everybody's, knuckles that hang on each other instead of on the hand's root, a finer grid
-of depths, and more turns of the hand. Keypoints of the face need no limbs: they are taken at the cheapest of
-the surfaces near them.
+Tried without benefit, and left out: the mode of depth around the keypoint instead of the best candidate, the
+detector's scores as weights of limbs, the person's true size for limb lengths instead of the population's,
+knuckles connected to each other instead of to the hand's root, a finer grid of depths, and more rotations of
+the hand. Keypoints of the face need no limbs: they get the best of the surfaces near them.
 
-A depth that no surface seen near the keypoint agrees with, or that no limb reaches, is *guessed*. What other
-depths would cost, taken for how unlikely they are, gives each depth its standard deviation.
+A depth that agrees with no surface seen near the keypoint, or that no limb reaches, is *guessed*. The costs
+of other depths, read as negative log-likelihoods, give each depth its standard deviation.
 
 Measures of people come from the body model (`body_measures`, `hand_shapes`; development bodies only). The
-costs (there, and in `depth_candidates` and `limb_lengths`) were weighed anew on the 24 development bodies,
+costs (there, and in `depth_candidates` and `limb_lengths`) were checked again on the 24 development bodies,
 16 frames each in the setups of both 3D pages, the D435's model, keypoints by MediaPipe and MoveNet Thunder
-(`tools/choose_lifting.py`): each of 28 constants times 0.5, 0.7, 1.4 and 2, for the 95th percentile of
-errors of wrists, elbows and fingers first and medians second. None of the 112 values was better by 3 % with
-an interval, over people, that excludes none: the largest gain was 3.9 % (8.6 % to a loss of 0.7 %; twice
-the slack of a hand's limbs), eight had clearly larger percentiles. So the costs stayed as they had been
-chosen on other bodies of the model. What a cost says of likelihood is from the same people: of 113 guessed
-joints of the body .63 and .98 lie within one and two sigma, each person's by the value that the others
-choose (.50 and .91 with the hands' value). No other sensor had a part in it. Where Thunder sees shoulders,
-they are 1.8 cm too wide in the median there, 1.3 of it in the image already, which no cost of depth mends.
+(`tools/choose_lifting.py`): each of 28 constants times 0.5, 0.7, 1.4 and 2, for the 95th percentile of errors
+of wrists, elbows and fingers first and medians second. None of the 112 values was better by 3 % with an
+interval, over people, that excludes none: the largest gain was 3.9 % (8.6 % to a loss of 0.7 %; twice the
+slack of a hand's limbs), eight had clearly larger percentiles. So the costs were kept as they had been chosen
+on other bodies of the model. The conversion of costs to likelihoods was chosen on the same people: of 113
+guessed joints of the body .63 and .98 lie within one and two sigma, each person's with the value chosen on
+the others (.50 and .91 with the hands' value). No other sensor was used. Thunder's shoulders are 1.8 cm too
+wide there in the median, of which 1.3 cm are already in the image, so no cost of depth can correct it.
 """
 
 from collections.abc import Sequence
@@ -51,12 +51,12 @@ from hicp_lib.lifting.limb_lengths import choose_along_limbs, limbs_outwards, ou
 from hicp_lib.lifting.paper import GUESSED, LIFTED, MIN_DEPTH_M, NO_DEPTH, Lifted, lift
 
 STEPS = ("below_surface", "near_surfaces", "limb_lengths", "hand_shapes")
-"""What goes beyond the paper; limb lengths choose among near surfaces, hand shapes are chosen with them."""
+"""The steps beyond the paper, each of which builds on the ones before."""
 
 METHODS = {"robust": len(STEPS), "paper": 0}
-"""Ways of lifting, by how many of `STEPS` they take."""
+"""Lifting methods, by how many of `STEPS` they take."""
 
-_REACH_M, _GRID_M = 0.90, 0.02  # grid of depths around the person's middle
+_REACH_M, _GRID_M = 0.90, 0.02  # grid of depths around the person's centre
 _END_ON = 0.5  # a joint is deeper by so much of its depth below the skin when its limb points at the camera
 _SEEN_SIGMA_M = 0.012  # of depths that are seen, beyond what their costs tell
 _IN_BODY, _IN_FACE = (np.isin(np.arange(N_KEYPOINTS), part) for part in (BODY, FACE))
@@ -72,7 +72,7 @@ _AHEAD = np.array(
 def lift_robust(
     keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera, n_steps: int = len(STEPS)
 ) -> Lifted:
-    """Lift the keypoints of everyone in an image; this module's head says how.
+    """Lift the keypoints of all people in an image by the method of this module.
 
     Keypoints are lifted when there is depth within 30 mm (body and feet) or 10 mm (face and hands) of them.
 
@@ -85,7 +85,7 @@ def lift_robust(
     intrinsics : Camera
         Of that image.
     n_steps : int, optional
-        How many of `STEPS` to take, to see what each brings; 0 for the paper's method.
+        How many of `STEPS` to take, to measure the effect of each; 0 for the paper's method.
 
     Returns
     -------
@@ -130,13 +130,13 @@ def lift_robust(
 def _depths(
     found: np.ndarray, first_m: np.ndarray, pixels_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera
 ) -> tuple[np.ndarray, Candidates]:
-    """Depths in question for one person (g,), and what is seen around the keypoints found (m,).
+    """Possible depths of one person (g,), and the surfaces around the detected keypoints (m,).
 
     `first_m` (m,) are the paper's depths, `pixels_px` has the shape (m, 2).
     """
     middle_m = _middle_m(found, first_m)
     nearest_m, farthest_m = max(middle_m - _REACH_M, MIN_DEPTH_M), middle_m + _REACH_M
-    # What is seen may be the wall: the neighbourhood is never smaller than at the person's middle.
+    # The surface may be the wall: the neighbourhood is never smaller than at the person's distance.
     near_m = np.clip(np.fmin(first_m, middle_m), nearest_m, None)
     candidates = depth_candidates(found, pixels_px, near_m, depth_m, intrinsics, load_measures().below_skin_m)
     return np.arange(nearest_m, farthest_m, _GRID_M), candidates
@@ -151,7 +151,7 @@ def _choose(
         costs = with_hand_shapes(costs, grid_m, candidates.rays, found)
     chosen = costs.argmin(axis=1)
     if "limb_lengths" in steps:
-        on = np.flatnonzero(~_IN_FACE[found])  # what hangs on limbs
+        on = np.flatnonzero(~_IN_FACE[found])  # keypoints connected by limbs
         limbs = limbs_outwards(grid_m, candidates.rays[on], found[on], load_measures())
         chosen[on], costs[on] = choose_along_limbs(costs[on], limbs)
     depth_m, is_seen = refine_depths(candidates, grid_m[chosen], _GRID_M)
@@ -164,7 +164,7 @@ def _choose(
 
 
 def _deeper_end_on(points_m: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """By what share joints (m,) are farther away, as their limb comes towards the camera and hides them."""
+    """The fraction by which joints (m,) are farther away when their limb points at the camera."""
     rows, ahead = np.searchsorted(found, _AHEAD[:, np.isin(_AHEAD, found).all(axis=0)])
     joints_m, limbs_m = points_m[rows], points_m[rows] - points_m[ahead]
     away_m, length_m = (np.linalg.norm(vectors, axis=1) for vectors in (joints_m, limbs_m))
@@ -175,13 +175,13 @@ def _deeper_end_on(points_m: np.ndarray, found: np.ndarray) -> np.ndarray:
 
 
 def _sigmas_m(costs: np.ndarray, grid_m: np.ndarray, depth_m: np.ndarray, unlikely: np.ndarray) -> np.ndarray:
-    """Standard deviation of depths (m,): one that costs `unlikely` (m,) more (m, g) is 1/e as likely."""
+    """Standard deviation of depths (m,): a cost (m, g) higher by `unlikely` (m,) means 1/e as likely."""
     weights = np.exp((costs.min(axis=1, keepdims=True) - costs) / unlikely[:, None])
     away_m2 = (grid_m - depth_m[:, None]) ** 2
     return np.sqrt(_SEEN_SIGMA_M**2 + (weights * away_m2).sum(axis=1) / weights.sum(axis=1))
 
 
 def _middle_m(found: np.ndarray, first_m: np.ndarray) -> float:
-    """About how far away the person is: the median depth of the body, of everything without one."""
+    """Approximate distance of the person: the median depth of the body, or of all keypoints without one."""
     body_m = first_m[_IN_BODY[found]]
     return float(np.nanmedian(body_m if np.isfinite(body_m).any() else first_m))

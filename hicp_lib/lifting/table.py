@@ -1,4 +1,4 @@
-"""Everyone's keypoints of a recording in space, as one tidy table."""
+"""Lift the keypoints of all people in a recording, as one tidy table."""
 
 from collections.abc import Mapping, Sequence
 
@@ -21,7 +21,7 @@ _COORDINATES = ("x_m", "y_m", "z_m", "x_cam_m", "y_cam_m", "z_cam_m")
 def lift_recording(
     recording: Recording, detections: Sequence[Detections], method: str = "robust"
 ) -> pd.DataFrame:
-    """Lift the keypoints of everyone in every frame.
+    """Lift the keypoints of all people in every frame.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ def lift_recording(
     Returns
     -------
     pd.DataFrame
-        One row per frame x person x keypoint detected, columns frame (row of the recording), t_s, person
-        (0 has the best score), keypoint (Halpe name), u_px, v_px, score, x_m, y_m, z_m (robot's base frame),
+        One row per frame x person x keypoint detected, columns frame (row of the recording), t_s, person (0
+        has the highest score), keypoint (Halpe name), u_px, v_px, score, x_m, y_m, z_m (robot's base frame),
         x_cam_m, y_cam_m, z_cam_m (camera frame), sigma_m (of the depth; NaN by the paper's method), reason
         (one of `hicp_lib.lifting.paper.REASONS`); coordinates are NaN unless it is "lifted" or "guessed".
 
@@ -52,7 +52,7 @@ def lift_recording(
 def lift_found(
     recording: Recording, found: Mapping[str, Sequence[Detections]], n_steps: Mapping[str, int] = METHODS
 ) -> pd.DataFrame:
-    """Lift what several detectors found by several methods; every depth image is read once.
+    """Lift the results of several detectors by several methods; every depth image is read once.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def lift_found(
 def lift_pixels(
     recording: Recording, pixels: pd.DataFrame, radii_m: Sequence[float] = (BODY_RADIUS_M,)
 ) -> np.ndarray:
-    """Put pixels of a recording's images in space by the paper's method.
+    """Lift pixels of a recording's images by the paper's method.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def lift_pixels(
     pixels : pd.DataFrame
         Columns `frame, u_px, v_px`, n rows.
     radii_m : sequence of float, optional
-        Half the side of the neighbourhood that the depth is taken from; every depth image is read once.
+        Half the side of the neighbourhood from which the depth is taken; every depth image is read once.
 
     Returns
     -------

@@ -1,11 +1,11 @@
-"""Markers clicked in images: `clicks.csv` of a recording, and an image to read positions from.
+"""Markers clicked in images: `clicks.csv` of a recording, and a figure to read positions from.
 
     frame,marker,u_px,v_px
     12,elbow_left_1,311.5,207
 
-`show_frame` shows an image that zooms in the browser and says the pixel under the pointer; positions
-found so are written down by `record_click`. That needs no extension of Jupyter and works in exported
-pages, too.
+`show_frame` shows an image that can be zoomed in the browser and displays the pixel under the pointer;
+`record_click` saves positions read this way. This needs no extension of Jupyter and also works in exported
+pages.
 """
 
 import base64
@@ -38,9 +38,9 @@ def read_clicks(path: str | Path, recording: Recording, markers: Sequence[str]) 
     ----------
     path : str or Path
     recording : Recording
-        The one that was clicked in.
+        The recording with the clicked images.
     markers : sequence of str
-        The names there are in the motion capture.
+        Names in the motion capture.
 
     Returns
     -------
@@ -67,13 +67,13 @@ def read_clicks(path: str | Path, recording: Recording, markers: Sequence[str]) 
 def record_click(
     recording: Recording, markers: Sequence[str], frame: int, marker: str, u_px: float, v_px: float
 ) -> pd.DataFrame:
-    """Write a marker's position into the recording's `clicks.csv`, in place of an earlier one.
+    """Save a marker's position in the recording's `clicks.csv`, replacing an earlier one.
 
     Parameters
     ----------
     recording : Recording
     markers : sequence of str
-        The names there are in the motion capture.
+        Names in the motion capture.
     frame : int
         Row of the recording.
     marker : str
@@ -88,7 +88,7 @@ def record_click(
     Raises
     ------
     InputError
-        If there is no such frame, marker or pixel, or the file there is malformed.
+        If there is no such frame, marker or pixel, or the existing file is malformed.
     """
     path = recording.folder / CLICKS_FILE
     click = {"frame": frame, "marker": marker, "u_px": u_px, "v_px": v_px}

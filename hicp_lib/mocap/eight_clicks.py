@@ -1,9 +1,9 @@
 """The paper's registration (section IV-C): eight markers clicked in two images, and one on the camera.
 
-The eight give the rotation by Arun's method. The translation is the one that puts the marker on the camera at
-the camera's optical centre; it is as wrong as that marker is far from the centre. Where the rotation is found
-about the middle of the eight, an error of it swings the person around the camera, a metre and more away.
-Where it is found about the camera, errors of depth, which lie along the lines of sight, turn nothing.
+The eight give the rotation by Arun's method. The translation puts the marker on the camera at the camera's
+optical centre; its error is that marker's distance from the centre. If the rotation is fitted about the
+centroid of the eight markers, its error moves the person, a metre and more away, around the camera. If it is
+fitted about the camera, errors of depth, which lie along the lines of sight, cause no rotation.
 """
 
 import numpy as np
@@ -20,10 +20,11 @@ N_MARKERS, N_IMAGES = 8, 2
 
 
 def select_markers(matched: pd.DataFrame) -> pd.DataFrame:
-    """Eight markers in two images, as in the paper: of the two images that show most markers, the eight
-    that lie furthest from each other.
+    """Eight markers in two images, as in the paper.
 
-    Clicks whose depth is that of something else, a wall behind for one, are not chosen.
+    They are from the two images that show most markers, the eight that are furthest from each other.
+
+    Clicks with the depth of another surface, such as a wall behind, are not chosen.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def select_markers(matched: pd.DataFrame) -> pd.DataFrame:
 def camera_places(
     recording: Recording, mocap: MotionCapture, offset_s: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where the marker on the camera was measured in every frame, and where the camera was.
+    """Measured positions of the marker on the camera in every frame, and positions of the camera.
 
     Parameters
     ----------
@@ -94,7 +95,7 @@ def register_by_camera_marker(
     marker_m, centre_m : array, shape (n_frames, 3)
         As from `camera_places`.
     about_camera : bool, optional
-        Whether the rotation is found about the camera, or about the middle of the points.
+        Whether the rotation is fitted about the camera, or about the centroid of the points.
 
     Returns
     -------
@@ -118,7 +119,7 @@ def register_by_camera_marker(
 
 
 def register_selected(matched: pd.DataFrame) -> Registration:
-    """Arun's method alone, from all of some markers.
+    """Arun's method alone, from all given markers.
 
     Parameters
     ----------

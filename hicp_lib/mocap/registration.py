@@ -1,7 +1,7 @@
-"""Where the motion capture's frame lies in the robot's base frame, from markers clicked in images.
+"""Pose of the motion capture's frame in the robot's base frame, from markers clicked in images.
 
-From the markers of all clicked images, those left out that do not agree with the others. The paper's way is
-in `eight_clicks`; `reprojection` has one without depth.
+It uses the markers of all clicked images, without those that disagree with the others. The paper's method is
+in `eight_clicks`; `reprojection` has a method without depth.
 """
 
 from __future__ import annotations
@@ -28,26 +28,25 @@ CAMERA_MARKER = "camera"
 REGISTRATION_FILE = "registration.json"
 SEEN, MEASURED = ["x_m", "y_m", "z_m"], ["mocap_x_m", "mocap_y_m", "mocap_z_m"]
 _OUTLIER_MEDIANS = 3 * 1.4826  # three standard deviations, as multiples of the median residual, ...
-_MIN_OUTLIER_M = 0.02  # ... and this are what residuals left out are beyond
+_MIN_OUTLIER_M = 0.02  # ... and this: larger residuals are left out
 _MAX_ROUNDS = 20
-_MAX_STRETCH_M = 0.1  # by which a distance may differ between what is seen and what is measured
-_MAX_SKEW = 1e-4  # by which a rotation of a file may differ from one: files are rounded
+_MAX_STRETCH_M = 0.1  # tolerance between a seen and a measured distance
+_MAX_SKEW = 1e-4  # tolerance of a rotation in a file: files are rounded
 
 
 @dataclass(frozen=True)
 class Registration:
-    """The motion capture's frame in the robot's base frame, and what it was found from.
+    """The motion capture's frame in the robot's base frame, and how it was computed.
 
     Attributes
     ----------
     method : str
-        How it was found, in words.
+        The method, in words.
     T_base_mocap : array, shape (4, 4)
     n_points : int
-        Clicked markers it rests on; 0 where it was given.
+        Number of clicked markers used; 0 if it was given.
     rms_m, leave_one_out_m : float
-        Root mean square residual, and median leave-one-out error, of Arun's fit to them; NaN where it was
-        given.
+        Root mean square residual, and median leave-one-out error, of Arun's fit to them; NaN if it was given.
 
     Examples
     --------
@@ -63,15 +62,15 @@ class Registration:
 
     @classmethod
     def of_fit(cls, method: str, fit: RigidFit, T_base_mocap: np.ndarray | None = None) -> Registration:
-        """What was found from a fit.
+        """The registration from a fit.
 
         Parameters
         ----------
         method : str
-            How, in words.
+            The method, in words.
         fit : RigidFit
         T_base_mocap : array, shape (4, 4), optional
-            The transform, where it is not the fit's own.
+            The transform, if it is not the fit's own.
 
         Returns
         -------
@@ -103,7 +102,7 @@ def lift_clicks(
     offset_s : float, optional
         To add to the motion capture's stamps to have them on the camera's clock.
     radius_m : float, optional
-        Half the side of the neighbourhood that the depth is taken from.
+        Half the side of the neighbourhood from which the depth is taken.
 
     Returns
     -------
@@ -120,7 +119,7 @@ def lift_clicks(
 def measured_markers(
     recording: Recording, clicks: pd.DataFrame, mocap: MotionCapture, offset_s: float
 ) -> np.ndarray:
-    """Where clicked markers were measured when they were seen.
+    """Measured positions of clicked markers at the times of the images.
 
     Parameters
     ----------
@@ -142,7 +141,7 @@ def measured_markers(
 
 
 def keeps_distances(matched: pd.DataFrame) -> np.ndarray:
-    """Which clicks are as far from most others in the one frame as in the other, to a decimetre.
+    """Which clicks have the same distances to most others in both frames, within a decimetre.
 
     Parameters
     ----------
@@ -161,10 +160,10 @@ def keeps_distances(matched: pd.DataFrame) -> np.ndarray:
 
 
 def register_robustly(matched: pd.DataFrame) -> Registration:
-    """Arun's method from all markers that agree.
+    """Arun's method with all markers that agree.
 
-    The start is from points that keep their distances to most others. Then points whose residual is beyond
-    three robust standard deviations (and 2 cm) are left out, and the fit is made anew, until it stays.
+    It starts with points that keep their distances to most others. Then points whose residual exceeds three
+    robust standard deviations (and 2 cm) are left out and the fit is repeated, until it no longer changes.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Registration from pixels alone: the transform under which measured markers fall where they were clicked.
+"""Registration from pixels only: the transform that projects measured markers to where they were clicked.
 
-Depth plays no part, so neither do its errors: beside an edge it is that of the wall behind, and next to a
-marker on a limb's side that of the skin before it. How far away the markers are follows from how far
-apart they appear, once the intrinsics are known.
+It uses no depth and is free of its errors: near an edge, depth may be that of the wall behind, and near a
+marker on the side of a limb, that of the skin in front. With known intrinsics, the distance of the markers
+follows from how far apart they appear.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ with needs("analysis"):
     from scipy.spatial.transform import Rotation
 
 _MIN_CLICKS = 6
-_CLICK_PX = 2.0  # a click further off than this counts ever less
-_STEP = 0.01  # radians and metres that change about as much
+_CLICK_PX = 2.0  # clicks with larger residuals get less and less weight
+_STEP = 0.01  # radians and metres with about the same effect
 _BEHIND_PX = 1e4  # residual of a marker that a transform puts behind the camera
 
 
@@ -36,7 +36,7 @@ def register_by_reprojection(
     start: Registration,
     offset_s: float = 0.0,
 ) -> Registration:
-    """The transform with the least distance, in pixels, between clicks and measured markers.
+    """The transform with the smallest distance, in pixels, between clicks and measured markers.
 
     Nonlinear least squares over rotation and translation, with a robust loss (Cauchy) against wrong clicks.
 
@@ -47,14 +47,14 @@ def register_by_reprojection(
         As from `hicp_lib.mocap.clicking.read_clicks`.
     mocap : MotionCapture
     start : Registration
-        Where to begin; some degrees and decimetres off are near enough.
+        Starting point; it may be off by some degrees and decimetres.
     offset_s : float, optional
         To add to the motion capture's stamps to have them on the camera's clock.
 
     Returns
     -------
     Registration
-        Its errors are across the line of sight: pixels times depth over focal length.
+        Its errors are perpendicular to the line of sight: pixels times depth over focal length.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def _solve(intrinsics: Camera, seen: _Clicked, T_start: np.ndarray) -> np.ndarra
 
 
 def _moved(T: np.ndarray, step: np.ndarray, about_m: np.ndarray) -> np.ndarray:
-    """`T` followed by a small turn about a point (first three of `step`, a rotation vector) and a shift."""
+    """`T`, then a small rotation about a point (first three of `step`, a rotation vector) and a shift."""
     moved = T.copy()
     moved[:3, 3] -= about_m
     moved[:3] = Rotation.from_rotvec(step[:3]).as_matrix() @ moved[:3]

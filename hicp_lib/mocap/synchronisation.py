@@ -1,4 +1,4 @@
-"""One clock for camera and motion capture: the offset between two, and positions at camera stamps."""
+"""Synchronise camera and motion capture: the offset of their clocks, and positions at camera stamps."""
 
 from dataclasses import dataclass
 
@@ -13,11 +13,11 @@ with needs("analysis"):
 # At 100 Hz: up to three frames missing in a row are bridged.
 MAX_GAP_S = 0.045
 _RATE_HZ = 100.0
-# Over how long speeds are smoothed, and over which gap they are known, at the least: at 10 Hz or more. In
-# periods of the slower clock below that.
+# Windows over which speeds are smoothed, and the largest bridged gap, at 10 Hz or more. Below that, in
+# periods of the slower clock.
 _LEAST_S, _SMOOTHED_PERIODS, _GAP_PERIODS = 0.25, 2.0, 2.5
-# Faster counts as this: a wrong detection, which seems to fly, must not outweigh a gesture. Chosen on
-# development people (14 of seed 0): the offset is four times as sure as with 4 m/s.
+# Upper limit of speeds, so that jumps from wrong detections do not outweigh gestures. Chosen on development
+# identities (14, seed 0): the offset's standard deviation is a quarter of that with 4 m/s.
 _MAX_SPEED_M_S = 0.5
 _MIN_OVERLAP_S = 2.0
 _MAX_DRIFT_S = 0.5
@@ -62,7 +62,7 @@ def interpolate_mocap(
         A point with a NaN coordinate is missing.
     stamps_s : array, shape (k,)
     max_gap_s : float, optional
-        Between samples further apart than this nothing is made up.
+        Gaps longer than this are not interpolated.
 
     Returns
     -------
@@ -97,12 +97,12 @@ def clock_offset(
 ) -> ClockOffset:
     """The offset of clock b, from the same points seen on both clocks.
 
-    The *speeds* of the points do not depend on the frame they are given in. They are smoothed
-    (Savitzky-Golay over a quarter of a second, or two periods of the slower clock), and the offset is where
-    one predicts the other best: where the logarithm of the likelihood ratio, -n/2 log(1 - r²) with r their
-    correlation and n how many smoothing windows both saw there, is largest. Few samples are soon alike by
-    chance, and count for little. A parabola through r refines it. All offsets are tried at which half of what
-    was seen of the points on the one clock was also seen on the other.
+    The *speeds* of the points do not depend on the frame they are given in. They are smoothed (Savitzky-Golay
+    over a quarter of a second, or two periods of the slower clock), and the offset is the one at which one
+    predicts the other best: where the logarithm of the likelihood ratio, -n/2 log(1 - r²), is largest, with r
+    their correlation and n the number of smoothing windows that both have there. Few samples, which can agree
+    by chance, thus get little weight. A parabola through r refines the offset. All offsets are tried at which
+    at least half of the samples on one clock have a counterpart on the other.
 
     Parameters
     ----------
@@ -122,8 +122,8 @@ def clock_offset(
     Raises
     ------
     InputError
-        If no offset makes the two move together, or several do: one apart from the best is at least a
-        twentieth as likely.
+        If no offset makes the two move together, or several do: a second one is at least a twentieth as
+        likely as the best.
 
     Examples
     --------
@@ -171,10 +171,10 @@ def _speeds(times_s: np.ndarray, points_m: np.ndarray, period_s: float = 0.0) ->
 def _best_lag(
     a: np.ndarray, b: np.ndarray, window: float, near: float | None = None
 ) -> tuple[float, float, float]:
-    """Rows by which b must be moved to be most like a, the correlation then, and another such lag.
+    """Rows by which b must be shifted to match a best, the correlation there, and another possible lag.
 
-    NaN where nothing is alike, and where no other lag, apart by more than the `window` of rows over which
-    speeds are smoothed, is about as likely.
+    NaN if nothing matches, and for the other lag if there is none more than the smoothing `window` away that
+    is about as likely.
     """
     values, n = _correlations(a, b)
     lags = np.arange(len(values)) - (len(b) - 1)
@@ -186,7 +186,7 @@ def _best_lag(
     around = values[max(peak - 1, 0) : peak + 2]
     if len(around) < 3 or not np.isfinite(around).all():
         return np.nan, np.nan, np.nan
-    # That a little less was seen there is no reason against another offset.
+    # Slightly fewer samples are not evidence against another offset.
     rivals = gain * np.clip(n[peak] / np.maximum(n, 1), 1, _OVERLAP_GIVEN)
     rival = int(np.argmax(np.where(np.abs(lags - lags[peak]) > window, rivals, -np.inf)))
     is_alike = rivals[rival] > gain[peak] - _FIT_ALIKE
@@ -196,9 +196,9 @@ def _best_lag(
 
 
 def _correlations(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pearson's correlation at every lag over what both have, each track about its own mean there.
+    """Pearson's correlation at every lag over the common samples, each track about its own mean there.
 
-    NaN where they have too little together; and the most samples of one track that are.
+    NaN where there are too few; and the largest number of common samples of one track.
     """
     seen_a, seen_b = np.isfinite(a), np.isfinite(b)
     a, b = np.where(seen_a, a, 0.0), np.where(seen_b, b, 0.0)

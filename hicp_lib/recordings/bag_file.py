@@ -1,4 +1,4 @@
-"""Messages of ROS bags: ROS 1, ROS 2 in SQLite or MCAP, and what librealsense records, which is either."""
+"""Messages of bags: ROS 1, ROS 2 in SQLite or MCAP, and librealsense's, which use either format."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,9 +15,9 @@ from hicp_lib.core.images import decode as decode_pixels
 from hicp_lib.core.limited import went_on
 
 _ROS1 = b"#ROSBAG V"
-_SURPLUS_BYTES = 4  # librealsense ends an image with the depth unit, which the message has no place for
+_SURPLUS_BYTES = 4  # librealsense appends the depth unit to an image, as the message has no field for it
 _RGB, _BGR = [0, 1, 2], [2, 1, 0]
-_ENCODINGS: dict[str, tuple[str, int, Any]] = {  # type, channels, and those that are taken
+_ENCODINGS: dict[str, tuple[str, int, Any]] = {  # type, channels, and those that are used
     "rgb8": ("u1", 3, _RGB), "rgba8": ("u1", 4, _RGB), "bgr8": ("u1", 3, _BGR), "bgra8": ("u1", 4, _BGR),
     "16UC1": ("u2", 1, 0), "mono16": ("u2", 1, 0), "32FC1": ("f4", 1, 0),
 }  # fmt: skip
@@ -37,7 +37,7 @@ class Bag:
     reader: Any
 
     def topics(self, *types: str) -> list[str]:
-        """Topics of messages of these types, which are named without their package."""
+        """Topics with messages of these types, named without their package."""
         named = {c.topic: c.msgtype.rpartition("/")[2] for c in self.reader.connections}
         return sorted(topic for topic, name in named.items() if name in types)
 
@@ -53,7 +53,7 @@ class Bag:
             yield connection.topic, recorded_ns, message
 
     def first(self, topic: str) -> Any:
-        """Content of a topic's first message; None where there is none."""
+        """Content of a topic's first message; None if there is none."""
         return next((message for _, _, message in self.messages(topic)), None)
 
 
@@ -73,14 +73,14 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
     Raises
     ------
     Exception
-        If it is none or damaged, here or where it is used, of many kinds: to be called in a process of its
-        own (`hicp_lib.core.limited.limited_child`).
+        If it is not a bag or damaged, here or during use, of many kinds: call it in a separate process
+        (`hicp_lib.core.limited.limited_child`).
     """
     with needs("bags"):
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
-    types = get_typestore(Stores.LATEST)  # for files that do not define theirs
-    if Path(path).suffix == ".bag":  # whose reader looks for the end of the first line, however far it is
+    types = get_typestore(Stores.LATEST)  # for files without type definitions
+    if Path(path).suffix == ".bag":  # whose reader searches for the end of the first line without limit
         with open(path, "rb") as file:
             if file.read(len(_ROS1)) != _ROS1:
                 raise InputError(f"{path}: does not begin as a bag of ROS 1 or RealSense does; get it again")
@@ -104,7 +104,7 @@ def stamp_s(message: Any) -> float:
 
 
 def decode(where: str, message: Any) -> np.ndarray:
-    """The picture of an `Image` or a `CompressedImage`.
+    """The pixels of an `Image` or `CompressedImage` message.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def decode(where: str, message: Any) -> np.ndarray:
     Raises
     ------
     InputError
-        If it is damaged, or of a kind that is neither.
+        If it is damaged, or neither colour nor depth.
     """
     if hasattr(message, "format"):
         return _decompressed(where, message)
@@ -138,7 +138,7 @@ def decode(where: str, message: Any) -> np.ndarray:
 
 
 def _decompressed(where: str, message: Any) -> np.ndarray:
-    """JPEG or PNG; depth has twelve bytes before it, the last eight for those that stand for floats."""
+    """JPEG or PNG; depth has a header of twelve bytes, of which the last eight encode floats."""
     is_depth, content = "compresseddepth" in message.format.lower(), np.asarray(message.data, np.uint8)
     image = decode_pixels(content[12 * is_depth :], f"{where}: {message.format[:40]!r}", cv2.IMREAD_UNCHANGED)
     if is_depth and message.format.startswith("32FC1"):

@@ -1,4 +1,4 @@
-"""Where the camera was, from the transforms or the joint angles that a ROS bag holds."""
+"""Camera poses from the transforms or joint angles in a ROS bag."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from hicp_lib.recordings.bag_file import Bag, stamp_s
 from hicp_lib.recordings.tum import MAX_DIFFERENCE_S
 
 Link = tuple[str, list[float], list[np.ndarray]]
-"""A frame's parent, and times and poses in it; no times where the frame never moves."""
+"""A frame's parent, and times and poses relative to it; no times for a static frame."""
 
 
 def read_links(bag: Bag) -> dict[str, Link]:
@@ -61,7 +61,7 @@ def rigid(transform: object) -> np.ndarray:
 
 
 def frame_poses(bag: Bag, links: dict[str, Link], base: str, frame: str, times_s: np.ndarray) -> np.ndarray:
-    """Poses of a frame in another.
+    """Poses of a frame relative to another.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def joint_poses(bag: Bag, mount: str, times_s: np.ndarray) -> np.ndarray:
     Returns
     -------
     array, shape (n, 4, 4)
-        Camera coordinates to the root frame; NaN where a joint was not told within 0.02 s.
+        Camera coordinates to the root frame; NaN where a joint angle is more than 0.02 s away.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def _ancestors(links: dict[str, Link], frame: str) -> list[str]:
 
 
 def _nearest(times_s: np.ndarray, known_s: Sequence[float], values: Sequence) -> np.ndarray:
-    """Values (m, ...) of the nearest of the times known; NaN where that is too far."""
+    """Values (m, ...) at the nearest known times; NaN where these are too far."""
     order = np.argsort(known_s, kind="stable")
     ordered_s = np.array(known_s)[order]
     nearest = np.searchsorted((ordered_s[1:] + ordered_s[:-1]) / 2, times_s)

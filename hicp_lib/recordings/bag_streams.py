@@ -1,4 +1,4 @@
-"""The colour and the depth of a bag: which topics they are, their cameras, and when each image was taken."""
+"""Colour and depth streams of a bag: their topics, cameras, and the time of each image."""
 
 import re
 from dataclasses import dataclass
@@ -29,13 +29,13 @@ class Stream:
         Of the camera, in the bag's transforms.
     camera : Camera
     pixels_px : array or None, shape (height, width, 2)
-        Where an ideal camera finds its pixels in the images (`undistortion`).
+        Positions of an undistorted camera's pixels in the images (`undistortion`).
     units_per_m : float
         Of depth in whole numbers.
     taken_s : dict of int to float
-        When images were taken, by the time of recording in nanoseconds, where their headers do not say it.
+        Times of images by their recording time in nanoseconds, if their headers do not contain them.
     notes : list of str
-        What a user must know of them.
+        Remarks for the user.
     """
 
     topic: str
@@ -48,16 +48,16 @@ class Stream:
 
 
 def find_streams(bag: Bag, topics: Topics) -> list[Stream]:
-    """Colour and depth, by their messages.
+    """Find the colour and depth streams by their messages.
 
-    Of a topic that is there raw and compressed, the raw one is taken; of several of depth, the one that is
-    in the frame of colour.
+    If a topic exists raw and compressed, the raw one is used; of several depth topics, the one in the colour
+    camera's frame.
 
     Parameters
     ----------
     bag : Bag
     topics : (str or None, str or None)
-        Those to be taken, where there are several.
+        The topics to use, if there are several.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def find_streams(bag: Bag, topics: Topics) -> list[Stream]:
     Raises
     ------
     InputError
-        If there is no such topic, or more than one; or its camera is not known.
+        If there is no such topic, or more than one; or its camera is unknown.
     """
     kinds = {topic: _kind(topic, bag.first(topic)) for topic in bag.topics("Image", "CompressedImage")}
     color, depth = ([topic for topic, (kind, _) in kinds.items() if kind == of] for of in ("color", "depth"))
@@ -79,7 +79,7 @@ def find_streams(bag: Bag, topics: Topics) -> list[Stream]:
 
 
 def realsense_links(bag: Bag) -> dict[str, Link]:
-    """Where librealsense says its streams are, as links of one frame.
+    """The poses of librealsense's streams, as links to one frame.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def realsense_links(bag: Bag) -> dict[str, Link]:
 
 
 def _kind(topic: str, message: Any) -> tuple[str, str]:
-    """What a topic's images show, and how they are encoded."""
+    """Whether a topic's images are colour or depth, and their encoding."""
     encoding = getattr(message, "encoding", "") or getattr(message, "format", "no messages")
     try:
         image = decode(topic, message) if message else np.zeros((1, 1), np.uint8)
@@ -152,9 +152,9 @@ def _stream(bag: Bag, topic: str) -> Stream:
 
 
 def _camera(bag: Bag, topic: str, frame: str) -> tuple[Camera, str, np.ndarray]:
-    """Camera, model and coefficients of the CameraInfo beside the images, or else of the same frame.
+    """Camera, model and coefficients from the CameraInfo next to the images, or else of the same frame.
 
-    Images that their topic's name calls rectified have the matrix P, and no distortion.
+    Images whose topic's name says that they are rectified use the matrix P, and no distortion.
     """
     infos = {name: bag.first(name) for name in bag.topics("CameraInfo")}
     beside = [name for name in infos if topic.startswith(name.removesuffix("camera_info"))]

@@ -1,4 +1,4 @@
-"""A bag of ROS or of RealSense becomes a recording: colour, depth aligned to it, and poses."""
+"""Convert a ROS or RealSense bag to a recording: colour, depth aligned to it, and poses."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,7 +15,7 @@ from hicp_lib.recordings.rectification import align_depth, rectify
 from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, associate
 from hicp_lib.recordings.writer import Poses, write_recording
 
-_SAME_PX = 0.5  # intrinsics this alike are those of one camera
+_SAME_PX = 0.5  # intrinsics this similar belong to one camera
 
 
 def import_bag(
@@ -26,11 +26,11 @@ def import_bag(
     base_frame: str | None = None,
     joints_mount: str | None = None,
 ) -> tuple[int, list[str]]:
-    """Import a bag of ROS 1 or 2, or of librealsense, in a process of its own (`limited_child`).
+    """Import a bag of ROS 1 or 2, or of librealsense, in a separate process (`limited_child`).
 
-    Distortion is undone and depth aligned to colour on the way. Times are those of the images' headers; an
-    image of depth belongs to the nearest of colour within half of their period. Colour is stored as JPEG of
-    high quality.
+    Images are undistorted and depth is aligned to colour. Times are those of the images' headers; a depth
+    image is paired with the nearest colour image within half a period. Colour is stored as JPEG of high
+    quality.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def import_bag(
     poses : tuple of array, optional
         As `read_pose_source` gives them.
     topics : (str or None, str or None), optional
-        Of colour and of depth; needed where the bag holds several.
+        Of colour and depth; needed if the bag has several.
     base_frame : str, optional
         Frame of the bag's transforms, in which the poses are.
     joints_mount : str, optional
@@ -50,7 +50,7 @@ def import_bag(
     -------
     n_frames : int
     notes : list of str
-        What was done to the images or left out, one line each.
+        Changes to images, and images left out, one line each.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def _import(
 
 
 def _alignment(bag: Bag, color: Stream, depth: Stream) -> np.ndarray | None:
-    """The depth camera's coordinates to the colour camera's; None where depth is aligned already."""
+    """From the depth camera's coordinates to the colour camera's; None if depth is already aligned."""
     if color.frame == depth.frame:
         of_color, of_depth = (list(vars(stream.camera).values()) for stream in (color, depth))
         if np.allclose(of_color, of_depth, rtol=0, atol=_SAME_PX):
@@ -104,7 +104,7 @@ def _alignment(bag: Bag, color: Stream, depth: Stream) -> np.ndarray | None:
 
 
 def _pairs(bag: Bag, color: Stream, depth: Stream, notes: list[str]) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Times of colour that have depth, and which of their topics' messages belong together."""
+    """Times of colour images with depth, and the indices of the paired messages."""
     (color_s, color_rows), (depth_s, depth_rows) = (_times(bag, stream, notes) for stream in (color, depth))
     half_period_s = np.median(np.diff(color_s)) / 2 if len(color_s) > 1 else MAX_DIFFERENCE_S
     a, b = associate(color_s, depth_s, half_period_s)
@@ -119,7 +119,7 @@ def _pairs(bag: Bag, color: Stream, depth: Stream, notes: list[str]) -> tuple[np
 
 
 def _times(bag: Bag, stream: Stream, notes: list[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Times that increase, and which messages they are of."""
+    """Increasing times, and the indices of their messages."""
     times_s = [stream.taken_s.get(ns) or stamp_s(message) for _, ns, message in bag.messages(stream.topic)]
     before_s = np.maximum.accumulate([-np.inf, *times_s])[:-1]
     rows = np.flatnonzero(times_s > before_s)
@@ -130,7 +130,7 @@ def _times(bag: Bag, stream: Stream, notes: list[str]) -> tuple[np.ndarray, np.n
 
 
 def _images(bag: Bag, stream: Stream, rows: np.ndarray) -> Iterator[np.ndarray]:
-    """Pictures without distortion, of the camera's size."""
+    """Undistorted images of the camera's size."""
     where, wanted = f"{bag.path}: {stream.topic}", set(rows.tolist())
     for row, (_, _, message) in enumerate(bag.messages(stream.topic)):
         if row in wanted:
@@ -140,7 +140,7 @@ def _images(bag: Bag, stream: Stream, rows: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _known(bag: Bag, times_s: np.ndarray, T_base_cam: np.ndarray, notes: list[str]) -> Poses:
-    """Poses without those that are not known."""
+    """The poses that are known."""
     is_known = np.isfinite(T_base_cam).all(axis=(1, 2))
     if not is_known.any():
         raise InputError(

@@ -1,7 +1,7 @@
-"""C3D files: the trajectories of markers, in and out, through ezc3d.
+"""Read and write trajectories of markers in C3D files, with ezc3d.
 
-A C3D file says twice how its numbers lie: in its first block and in its parameters. ezc3d believes the
-parameters; here both are compared, and what is left of the file decides between them, or nothing does.
+A C3D file describes its data layout twice: in its first block and in its parameters. ezc3d uses the
+parameters. Here both are compared; if they differ, the file's size decides, or the file is refused.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ with needs("analysis"):
 if TYPE_CHECKING:
     from hicp_lib.recordings.qualisys import MotionCapture
 
-# The longer ones are how the words for a unit begin: old files cut them to four letters.
+# The longer ones are beginnings of unit names: old files truncate them to four letters.
 _UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 _UNITS_M |= {"mill": 1e-3, "cent": 1e-2, "met": 1.0, "inch": 0.0254, "feet": 0.3048, "foot": 0.3048}
 _MAX_RATE_HZ = 1e5
-_SAME_SHARE = 0.005  # of a rate or scale, by which its two statements may differ
+_SAME_SHARE = 0.005  # tolerance between the two values of a rate or scale
 _PARAMETERS = ("RATE", "SCALE", "FRAMES", "DATA_START")
 _BLOCK_BYTES = 512
-MAX_FRAMES = 65535  # that the format's own header counts to
+MAX_FRAMES = 65535  # the most frames that the format's header can count
 
 Points = tuple[np.ndarray, tuple[str, ...], float]
 Said = Mapping[str, np.ndarray]
@@ -51,7 +51,7 @@ def read_points(path: Path) -> Points:
     points_m : array, shape (n, m, 3)
         NaN where the residual is negative.
     names : tuple of str
-        Of the m markers, no two alike: those named the same are numbered, one without a name is "unnamed".
+        Of the m markers, unique: equal names are numbered, a missing one becomes "unnamed".
     rate_hz : float
         Frames per second.
 
@@ -77,7 +77,7 @@ def read_points(path: Path) -> Points:
 
 
 def _convert(path: str, out: str) -> tuple[tuple[str, ...], float]:
-    """Write the points; names and rate. ezc3d takes a damaged file's word for its size."""
+    """Write the points; return names and rate. ezc3d trusts a damaged file's sizes."""
     raw = read_bytes(path, "give the path of a C3D file")
     if raw[1:2] != b"\x50":
         raise InputError(f"{path}: is not a C3D file (its second byte is not 80); export it again")
@@ -92,7 +92,7 @@ def _convert(path: str, out: str) -> tuple[tuple[str, ...], float]:
 
 
 def decoded(raw: bytes) -> str:
-    """Text of an export; what is not UTF-8 is in the code page of its computer, where every byte is a letter.
+    """Text of an export; if it is not UTF-8, it is read in a code page in which every byte is a character.
 
     Examples
     --------
@@ -125,7 +125,7 @@ def _checked(path: str, points: np.ndarray, residuals: np.ndarray, said: Said) -
 
 
 def _distinct(names: Sequence[str]) -> list[str]:
-    """Names, numbered where several are the same: none of them may pass for the one that was meant."""
+    """Names, numbered where several are equal, so that none is mistaken for the intended one."""
     total, so_far, distinct = Counter(names), Counter[str](), []
     for name in names:
         so_far[name] += 1
@@ -164,7 +164,7 @@ def _refuse_contradictions(
         told = f"header and parameters disagree on {', '.join(wrong)}"
         raise InputError(f"{path}: {told}; export it again, or as TSV")
     header, frames, by_size = last - first + 1, int(of["FRAMES"]), data_bytes // max(frame_bytes, 1)
-    # Counts that do not reach further stay at the highest, or start again: then there is room for more.
+    # Counts that overflow stay at the maximum or wrap around: the file is then larger.
     is_counted = header == n < MAX_FRAMES and frames in (0, n) and by_size - n < MAX_FRAMES
     if not is_counted:
         counts = f"{header} (header), {frames} (POINT:FRAMES), {by_size} (size of the file)"
@@ -173,7 +173,7 @@ def _refuse_contradictions(
 
 
 def _fits(file_bytes: int, data_bytes: int) -> bool:
-    """Whether data fill a file but for the rest of a block."""
+    """Whether data fill a file up to the end of the last block."""
     return 0 <= file_bytes - data_bytes < _BLOCK_BYTES
 
 
@@ -190,7 +190,7 @@ def write_c3d(path: str | Path, mocap: MotionCapture) -> None:
     Raises
     ------
     InputError
-        For more frames than the format counts to.
+        For more frames than the format can count.
     """
     points_m = mocap.points_m
     if len(points_m) >= MAX_FRAMES:

@@ -13,9 +13,9 @@ from hicp_lib.formats.json_validation import is_number, shown
 from hicp_lib.recordings.rectification import undistortion
 
 MAX_SIDE_PX, MAX_PIXELS = 16_384, 2**25  # of images with depth, which are lifted whole
-_LEAST_FOCAL, _MOST_FOCAL_PX = 0.05, 6000.0  # the least as a share of the longer side: views of 170 degrees
+_LEAST_FOCAL, _MOST_FOCAL_PX = 0.05, 6000.0  # minimum, relative to the longer side: a view of 170 degrees
 _MAX_SCALE = 1e5  # units of 0.01 mm, of which 16 bits hold 0.65 m
-_DISTORTION = re.compile(r"(?i)d|.*(dist|coef).*|k[1-6]|p[12]")  # however a tool names the key
+_DISTORTION = re.compile(r"(?i)d|.*(dist|coef).*|k[1-6]|p[12]")  # names of the key in various tools
 _LAYOUT = "fx, 0, 0, 0, fy, 0, cx, cy, 1"
 
 
@@ -55,7 +55,7 @@ def read_camera(path: str | Path) -> tuple[Camera, float]:
     Raises
     ------
     InputError
-        If the file is not such a file, and the key is named; or if images are distorted.
+        If the file is malformed (the key is named), or if images are distorted.
 
     Examples
     --------
@@ -89,12 +89,12 @@ def read_distorted_camera(
     intrinsics : Camera
     depth_units_per_m : float
     pixels_px : array or None, shape (height, width, 2)
-        As `undistortion` gives them.
+        As from `undistortion`.
 
     Raises
     ------
     InputError
-        If the file is not such a file, or the distortion cannot be undone.
+        If the file is malformed, or the distortion cannot be removed.
     """
     content = read_json(path)
     if not isinstance(content, dict):
@@ -112,7 +112,7 @@ def read_distorted_camera(
 
 
 def refuse_implausible(where: str, camera: Camera) -> None:
-    """Refuse a camera that none is: lifting would take what memory there is, for nothing.
+    """Refuse an implausible camera, with which lifting could use up all memory.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def write_camera(path: str | Path, intrinsics: Camera, depth_units_per_m: float)
 
 
 def _distortion(path: str | Path, content: dict, intrinsics: Camera) -> np.ndarray | None:
-    """What its keys say, of which one is the model's name and one the list of coefficients."""
+    """The model's name and the list of coefficients, from its keys."""
     said = [content[key] for key in content if _DISTORTION.fullmatch(key)]
     model = next((value for value in said if isinstance(value, str)), "")
     numbers = [value for value in said if not isinstance(value, str | None) and value not in (0, [])]

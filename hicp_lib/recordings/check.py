@@ -1,4 +1,4 @@
-"""What is missing or inconsistent in anyone's recording, in one line each."""
+"""Find what is missing or inconsistent in a recording, one line each."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,9 +24,9 @@ from hicp_lib.recordings.recording import (
 )
 from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, associate, read_file_list, read_poses, remarks
 
-PLAUSIBLE_DEPTH_M = (0.1, 12.0)  # where the middle of what a camera near a robot sees must lie
-FURTHEST_POSE_M = 10.0  # from the base: a robot reaches less, a pose in millimetres more
-MIN_COVERED = 0.9  # share of the images' time that motion capture must last
+PLAUSIBLE_DEPTH_M = (0.1, 12.0)  # of the median depth that a camera near a robot sees
+FURTHEST_POSE_M = 10.0  # from the base: a robot's reach is less, a pose in millimetres is more
+MIN_COVERED = 0.9  # fraction of the images' time that motion capture must cover
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def check_recording(folder: str | Path) -> list[Finding]:
     Returns
     -------
     list of Finding
-        One each; none where all is well.
+        One each; empty if all is well.
 
     Examples
     --------
@@ -87,7 +87,7 @@ class _Findings(list[Finding]):
         self.append(Finding(f"{path}: {text}", is_fatal))
 
     def attempt(self, read: Callable, *arguments: object) -> Any:
-        """What is read; None, and a finding, where it cannot be."""
+        """The result of reading; on an error None, and a finding is added."""
         try:
             return read(*arguments)
         except InputError as error:
@@ -96,7 +96,7 @@ class _Findings(list[Finding]):
 
 
 def _check_files(findings: _Findings, folder: Path) -> None:
-    """Text files missing or malformed, images listed but not there, images without a partner."""
+    """Missing or malformed text files, missing images, unpaired images."""
     findings.attempt(read_camera, folder / CAMERA_FILE)
     lists = [findings.attempt(read_file_list, folder / name) for name in (RGB_LIST, DEPTH_LIST)]
     for _, names in filter(None, lists):

@@ -1,7 +1,7 @@
-"""Recordings made by others' tools: the folder layout that Open3D's write, and where the camera was.
+"""Recordings of other tools: Open3D's folder layout, and sources of camera poses.
 
 Images are copied as they are, unless they are distorted. Poses come from the user: a text file in the
-TUM layout, one line of which is a camera that stands still, or a CSV of the robot's joint angles.
+TUM layout, where a single line means a camera that does not move, or a CSV of the robot's joint angles.
 """
 
 import re
@@ -44,7 +44,7 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
     Returns
     -------
     times_s : array, shape (m,)
-        One time where the camera stands still, none where the poses are of frame after frame.
+        One time if the camera does not move, none if the poses are one per frame.
     T_base_cam : array, shape (m, 4, 4)
         Camera coordinates to the robot's base frame.
 
@@ -83,7 +83,7 @@ def import_open3d(
 ) -> tuple[int, list[str]]:
     """Import `color/`, `depth/` and `intrinsic.json` or `camera_intrinsic.json`, as Open3D's recorders do.
 
-    Distortion that the file tells is undone. Frames are in the order of the numbers in their names.
+    Images are undistorted by the file's coefficients. Frames are in the order of the numbers in their names.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def import_open3d(
     -------
     n_frames : int
     notes : list of str
-        What was done to the images, and what the files say in two ways; one line each.
+        Changes to the images, and contradictions between files, one line each.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def import_open3d(
         lengths = f"stream_length_usec is {said_us / 1e6:.2f} s, {len(rgb)} frames are {lasts_s:.2f} s"
         notes.append(f"{path}: {lengths}; frames were dropped, or the rate is another")
     refuse_used_folder(out)
-    is_plain = all(re.fullmatch(r"[\w.-]+", image.name) for image in rgb + depth)  # as lists can name them
+    is_plain = all(re.fullmatch(r"[\w.-]+", image.name) for image in rgb + depth)  # as lists can contain them
     rgb_names, depth_names = (
         [f"{of}/{image.name if is_plain else f'{k:06d}{image.suffix}'}" for k, image in enumerate(images)]
         for of, images in (("rgb", rgb), ("depth", depth))
@@ -156,7 +156,7 @@ def _images(folder: Path) -> list[Path]:
 
 
 def _frame_numbers(paths: list[Path], notes: list[str]) -> np.ndarray:
-    """Which frame each image is, from 0: by its name's number, where few are missing."""
+    """The frame of each image, from 0: by the number in its name, if few are missing."""
     in_order = np.arange(len(paths))
     numbers = [int(match[0]) for path in paths if (match := re.search("[0-9]+$", path.stem))]
     missing = numbers[-1] - numbers[0] + 1 - len(paths) if len(numbers) == len(paths) else 0

@@ -1,4 +1,4 @@
-"""Motion capture as Qualisys Track Manager exports it: TSV (3D data) and C3D, in and out.
+"""Read and write motion capture in Qualisys Track Manager's export formats: TSV (3D data) and C3D.
 
 Files are in millimetres, everything here in metres. Sources: the Qualisys documentation, "Motion
 data (.tsv)", and headers of exports found in public repositories; for C3D, ezc3d.
@@ -21,7 +21,7 @@ _TIME_CODE = re.compile(r"\d+(:\d+)+([:;.]\d+)*")  # SMPTE, IRIG
 _SAID_ONCE = ("FREQUENCY", "MARKER_NAMES", "NO_OF_FRAMES", "NO_OF_MARKERS")
 _MAX_RATE_HZ = 1e5
 MAX_MARKER_M = 10_000.0  # from the origin, in any direction
-_SHOWN = 40  # characters of a wrong value that a message repeats
+_SHOWN = 40  # characters of a wrong value shown in a message
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class MotionCapture:
     times_s : array, shape (n,)
         Increasing, on the motion capture system's own clock.
     names : tuple of str
-        Of the m markers, no two alike.
+        Of the m markers, unique.
     points_m : array, shape (n, m, 3)
         All three NaN where a marker was not measured.
     rate_hz : float
@@ -49,10 +49,10 @@ class MotionCapture:
 def read_mocap(path: str | Path) -> MotionCapture:
     """Read a Qualisys export: 3D data as ``.tsv``, or ``.c3d``.
 
-    TSV: unknown keys are passed over; column titles and the columns Frame, Time and time code (SMPTE)
-    are optional. A marker is missing where a coordinate is empty, NULL or NaN, or where all three are
-    exactly zero. Time starts at 0 at frame 1 unless the file has a Time column, which gives the rate, too,
-    where FREQUENCY is EXT.
+    TSV: unknown keys are ignored; column titles and the columns Frame, Time and time code (SMPTE) are
+    optional. A marker is missing where a coordinate is empty, NULL or NaN, or where all three are exactly
+    zero. Time starts at 0 at frame 1 unless the file has a Time column, which also gives the rate if
+    FREQUENCY is EXT.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def _is_data(line: str) -> bool:
 
 
 def _header(path: Path, lines: list[str]) -> dict[str, list[str]]:
-    """Values by key; all else above the data is passed over."""
+    """Values by key; all other lines above the data are ignored."""
     header: dict[str, list[str]] = {}
     for line in lines:
         key, *values = (field.strip() for field in line.rstrip().split("\t"))
@@ -187,7 +187,7 @@ def _names(path: Path, header: dict[str, list[str]]) -> tuple[str, ...]:
 
 
 def _rate_hz(path: Path, header: dict[str, list[str]]) -> float:
-    """NaN where an external signal took the measurements."""
+    """NaN if an external signal triggered the measurements."""
     text = (header.get("FREQUENCY") or ["absent"])[0]
     if text == "EXT":
         return math.nan
@@ -197,14 +197,14 @@ def _rate_hz(path: Path, header: dict[str, list[str]]) -> float:
 
 
 def _check_count(path: Path, header: dict[str, list[str]], key: str, found: int, what: str) -> None:
-    """Refuse a file whose header counts otherwise; an unreadable count says nothing."""
+    """Refuse a file whose header states another count; an unreadable count is ignored."""
     stated = (header.get(key) or [""])[0]
     if stated.isascii() and stated.isdigit() and stated != str(found):
         raise InputError(f"{path}: {key} is {stated[:_SHOWN]} but there are {found} {what}; export it again")
 
 
 def _rows(path: Path, lines: list[str], start: int) -> list[list[str]]:
-    """The fields of data, without the empty column of exports that end every line with a tab."""
+    """The fields of the data, without the empty last column of exports that end every line with a tab."""
     rows, width = [], lines[start].count("\t") + 1
     for number, line in enumerate(lines[start:], start=start + 1):
         rows.append([field.strip() for field in line.split("\t")])
@@ -217,7 +217,7 @@ def _rows(path: Path, lines: list[str], start: int) -> list[list[str]]:
 
 
 def _titles(where: str, line: str, names: tuple[str, ...], width: int) -> list[str] | None:
-    """Titles of the columns before the coordinates, None if the line has none."""
+    """Titles of the columns before the coordinates, None if the line is not a title line."""
     titles = [title.strip() for title in line.rstrip().split("\t")]
     axes = [(name, axis) for name in names for axis in "XYZ"]
     if titles[0].title() not in ("Frame", "Time", "Smpte") and f"{names[0]} X" not in titles:
@@ -232,7 +232,7 @@ def _titles(where: str, line: str, names: tuple[str, ...], width: int) -> list[s
 
 
 def _kind(column: list[str], rate_hz: float) -> str:
-    """What a column before the coordinates is by what it holds, "" if nothing known."""
+    """The kind of a column before the coordinates, by its content; "" if unknown."""
     if any(map(_TIME_CODE.fullmatch, column)):
         return "code" if all(field in _MISSING or _TIME_CODE.fullmatch(field) for field in column) else ""
     if not all(map(_NUMBER.fullmatch, column)):

@@ -1,6 +1,6 @@
-"""Recording from a RealSense: librealsense writes a bag, which then becomes a recording.
+"""Record from a RealSense: librealsense writes a bag, which is then converted to a recording.
 
-The bag holds what the camera gave, so that nothing is lost where the import is interrupted.
+The bag contains the camera's raw streams, so that nothing is lost if the import is interrupted.
 """
 
 import time
@@ -35,7 +35,7 @@ def record_camera(
 ) -> tuple[int, list[str]]:
     """Record from a RealSense until Ctrl-C.
 
-    Beside the recording stays `OUT.db3`, the bag it was made of.
+    The bag it was made from is kept as `OUT.db3`.
 
     Parameters
     ----------
@@ -44,16 +44,16 @@ def record_camera(
     poses : tuple of array, optional
         As `read_pose_source` gives them.
     joint_lines : iterable of str, optional
-        In place of `poses`: lines of joint angles as they come (`read_joints_line`).
+        Instead of `poses`: lines of joint angles as they arrive (`read_joints_line`).
     mount : str, optional
         Camera holder, for joints.
     color_px, depth_px : (int, int), optional
         Width and height.
     rate_hz : int, optional
     duration_s : float, optional
-        Ends by itself after that.
+        Ends automatically after this time.
     device : Any, optional
-        pyrealsense2's; the first that is connected when left out.
+        pyrealsense2's; by default the first connected one.
 
     Returns
     -------
@@ -64,7 +64,8 @@ def record_camera(
     Raises
     ------
     InputError
-        If there is no camera, or none of these sizes; if it stops; afterwards, if a line of joints is none.
+        If there is no camera, or it lacks these sizes; if it stops; afterwards, if a line of joints is
+        malformed.
     """
     require("bags", "rosbags")
     with needs("camera"):
@@ -92,25 +93,25 @@ def read_joints_line(line: str, arrival_s: float) -> tuple[float, list[float]]:
     """Time and joint angles of a line of text.
 
     Six numbers, in degrees: torso pitch, roll, yaw, neck pitch, roll, yaw; or, as YARP prints them with their
-    envelope, a count, a time in seconds and those six. Brackets are passed over.
+    envelope, a count, a time in seconds and those six. Brackets are ignored.
 
     Parameters
     ----------
     line : str
     arrival_s : float
-        When it came, in seconds since 1970.
+        Time of its arrival, in seconds since 1970.
 
     Returns
     -------
     time_s : float
-        That of its arrival where the line has none.
+        Time of arrival if the line has none.
     angles_deg : list of float
         Six.
 
     Raises
     ------
     InputError
-        If it is no such line.
+        If the line is malformed.
 
     Examples
     --------
@@ -152,7 +153,7 @@ def _record(rs: Any, device: Any, bag: Path, modes: dict[str, Mode], duration_s:
             sensors.append(sensor)
         Event().wait(duration_s)
     except KeyboardInterrupt:
-        pass  # that is how a recording ends
+        pass  # the normal end of a recording
     finally:
         for sensor in sensors:
             sensor.stop()

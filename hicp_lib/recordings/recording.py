@@ -6,9 +6,9 @@
     camera.json                       intrinsics, and `depth_scale`: units per metre
     mocap.tsv                         optional: motion capture as Qualisys exports it
 
-Depth is aligned to colour: both images have the size and the intrinsics of `camera.json`. A
-simulated recording holds more, as parquet and images: what is true (`read_truth`), the joints
-(`read_joints`), depth without the sensor's errors (`read_exact_depth_m`).
+Depth is aligned to colour: both images have the size and the intrinsics of `camera.json`. A simulated
+recording also contains, as Parquet and images, the ground truth (`read_truth`), the joints (`read_joints`),
+and depth without the sensor's errors (`read_exact_depth_m`).
 """
 
 from collections.abc import Sequence
@@ -45,7 +45,7 @@ class Recording:
     Attributes
     ----------
     folder : Path
-        Where it lies.
+        Its folder.
     intrinsics : Camera
         Of colour and of depth, which is aligned to it.
     depth_units_per_m : float
@@ -57,7 +57,7 @@ class Recording:
     T_base_cam : array, shape (n, 4, 4)
         Camera coordinates to the robot's base frame.
     mocap_path : Path or None
-        Motion capture as exported, None where there is none.
+        Exported motion capture, None if there is none.
     """
 
     folder: Path
@@ -140,7 +140,7 @@ def first_frames(recording: Recording, n: int) -> Recording:
 def associate_frames(
     rgb_s: np.ndarray, depth_s: np.ndarray, pose_s: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which colour images, depth images and poses belong together.
+    """Associate colour images, depth images and poses.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def read_exact_depth_m(recording: Recording, k: int) -> np.ndarray | None:
 
 
 def read_truth(recording: Recording) -> pd.DataFrame | None:
-    """Where the keypoints truly are.
+    """True positions of the keypoints.
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ def read_joints(recording: Recording) -> pd.DataFrame | None:
 
 
 def read_simulation(recording: Recording) -> dict | None:
-    """What a simulated recording was made with.
+    """The settings of a simulated recording.
 
     Parameters
     ----------
@@ -278,7 +278,7 @@ def read_simulation(recording: Recording) -> dict | None:
     Returns
     -------
     dict or None
-        None where it was not simulated.
+        None if it was not simulated.
     """
     path = recording.folder / SIMULATION_FILE
     return read_json(path) if path.is_file() else None
@@ -291,17 +291,18 @@ def read_csv(path: str | Path, numbers: Sequence[str], texts: Sequence[str] = ()
     ----------
     path : str or Path
     numbers, texts : sequence of str
-        Columns it must have, once.
+        Columns that must occur exactly once.
 
     Returns
     -------
     pd.DataFrame
-        Of these columns; NaN where nothing is written.
+        Of these columns; NaN for empty cells.
 
     Raises
     ------
     InputError
-        If it cannot be read, a column is missing or there twice, or a number is none; the first is named.
+        If it cannot be read, a column is missing or duplicated, or a value is not a number; the first is
+        named.
     """
     columns = [*numbers, *texts]
     table = read_table(path, columns, dtype=str)[columns]

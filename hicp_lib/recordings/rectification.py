@@ -1,4 +1,4 @@
-"""Images as a pinhole camera without distortion would see them, and depth as the colour camera would."""
+"""Undistort images, and align depth to the colour camera."""
 
 import re
 from collections.abc import Sequence
@@ -9,15 +9,15 @@ import numpy as np
 from hicp_lib.core.camera import Camera, deproject, project, transform
 from hicp_lib.core.errors import InputError
 
-# From ideal to seen pixels. So do librealsense's own functions take inverse_brown_conrady, too, whatever
-# the name says: they agree with it within 0.001 pixels, and with its inverse not within 5.
+# From undistorted to distorted pixels. librealsense's own functions treat inverse_brown_conrady the same way,
+# despite its name: they agree with this within 0.001 pixels, while the inverse differs by more than 5.
 _MODELS = ("plumb_bob", "brown_conrady", "inverse_brown_conrady", "rational_polynomial")
 
 
 def undistortion(
     where: str, camera: Camera, model: str, coefficients: Sequence[float] | np.ndarray
 ) -> np.ndarray | None:
-    """Where an ideal camera of the same intrinsics finds its pixels in a distorted image.
+    """Positions in a distorted image of the pixels of an undistorted camera with the same intrinsics.
 
     Parameters
     ----------
@@ -32,12 +32,12 @@ def undistortion(
     Returns
     -------
     array or None, shape (height, width, 2), dtype float32
-        Pixels (u, v) of the distorted image; None where it has no distortion.
+        Pixels (u, v) of the distorted image; None if there is no distortion.
 
     Raises
     ------
     InputError
-        If there is distortion of a model that cannot be undone.
+        If the distortion's model is not supported.
 
     Examples
     --------
@@ -58,14 +58,14 @@ def undistortion(
 
 
 def rectify(image: np.ndarray, pixels_px: np.ndarray | None) -> np.ndarray:
-    """Undo distortion: colour interpolated, depth of the nearest pixel; 0 outside of the image.
+    """Undistort an image: colour interpolated, depth of the nearest pixel; 0 outside the image.
 
     Parameters
     ----------
     image : array, shape (height, width, 3) or (height, width)
         Colour, or depth.
     pixels_px : array or None, shape (height, width, 2)
-        As `undistortion` gives them.
+        As from `undistortion`.
 
     Returns
     -------
@@ -81,18 +81,18 @@ def rectify(image: np.ndarray, pixels_px: np.ndarray | None) -> np.ndarray:
 def align_depth(depth_m: np.ndarray, camera: Camera, color: Camera, T_color_depth: np.ndarray) -> np.ndarray:
     """Depth as the colour camera would see it.
 
-    Each pixel of depth fills the colour pixels whose centres lie between its corners, so that a surface has
-    no holes; the nearest counts. Depth is along the axis of the colour camera.
+    Each depth pixel fills the colour pixels whose centres lie between its projected corners, so that surfaces
+    have no holes; where several overlap, the nearest is kept. Depth is along the axis of the colour camera.
 
     Parameters
     ----------
     depth_m : array, shape (height, width)
-        0 or NaN where there is none.
+        0 or NaN where missing.
     camera : Camera
         The depth camera.
     color : Camera
     T_color_depth : array, shape (4, 4)
-        The depth camera's coordinates to the colour camera's.
+        From the depth camera's coordinates to the colour camera's.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Where a camera was, as other tools write it: TUM, EuRoC, KITTI, and Open3D's `trajectory.log`."""
+"""Camera poses in other tools' formats: TUM, EuRoC, KITTI, and Open3D's `trajectory.log`."""
 
 from pathlib import Path
 
@@ -8,14 +8,14 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes
 from hicp_lib.recordings.tum import MAX_PLACE_M, read_poses
 
-_ROTATION_TOLERANCE = 0.01  # of R Rᵀ from the identity: files are rounded
+_ROTATION_TOLERANCE = 0.01  # tolerance of R Rᵀ from the identity, since files are rounded
 
 
 def read_trajectory(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
-    """Poses of a camera, in the layout that the file shows.
+    """Read camera poses in any of these formats, recognised by the content.
 
     Lines of 12 numbers are KITTI's matrices of 3 x 4; lines of 3, 4, 4, 4 and 4 numbers are one pose in
-    Open3D's log. Both are of frame after frame and know no times. All else is read by
+    Open3D's log. Both have one pose per frame and no times. Everything else is read by
     `hicp_lib.recordings.tum.read_poses`.
 
     Parameters
@@ -25,14 +25,14 @@ def read_trajectory(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     times_s : array, shape (n,)
-        Increasing; of length 0 where the poses are those of frame after frame.
+        Increasing; of length 0 if there is one pose per frame.
     T_base_cam : array, shape (n, 4, 4)
         Camera coordinates to the file's own world, metres.
 
     Raises
     ------
     InputError
-        If the file cannot be read or is none of these, or a matrix is no rigid transform.
+        If the file cannot be read or has another format, or a matrix is not a rigid transform.
     """
     text = read_bytes(path, "give a file of camera poses").decode("latin-1")
     rows = [fields for line in text.splitlines() if (fields := line.partition("#")[0].split())]
@@ -48,7 +48,7 @@ def read_trajectory(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
         expected = "'k k k+1' and a matrix of 4 x 4" if is_log else "12 numbers in every line"
         raise InputError(f"{path}: is cut off or damaged; expected {expected}") from None
     R, last = T_base_cam[:, :3, :3], T_base_cam[:, 3]
-    R[np.abs(R).max(axis=(1, 2)) > 2] = 0  # no rotation, and too large to be squared
+    R[np.abs(R).max(axis=(1, 2)) > 2] = 0  # not a rotation, and too large to be squared
     off = np.abs(R @ R.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2)) + np.abs(last - [0, 0, 0, 1]).max(axis=1)
     is_near = (np.abs(T_base_cam[:, :3, 3]) <= MAX_PLACE_M).all(axis=1)
     is_pose = is_near & (off <= _ROTATION_TOLERANCE) & (np.linalg.det(R) > 0)

@@ -1,10 +1,9 @@
-"""The text files of the TUM RGB-D layout: lists of images, camera poses, and how they go together.
+"""The text files of the TUM RGB-D layout: lists of images, camera poses, and their association by time.
 
-A line of `rgb.txt` or `depth.txt` is "timestamp filename", one of `groundtruth.txt` is
-"timestamp tx ty tz qx qy qz qw"; `#` starts a comment. Timestamps are seconds and increase. Where a line
-above the poses names their columns, as EuRoC's CSV does, they are what it says.
-Layout and association as in the tools of Sturm et al., *A Benchmark for the Evaluation of RGB-D
-SLAM Systems*, IROS 2012.
+A line of `rgb.txt` or `depth.txt` is "timestamp filename", one of `groundtruth.txt` is "timestamp tx ty tz qx
+qy qz qw"; `#` starts a comment. Timestamps are seconds and increase. If a line above the poses names their
+columns, as in EuRoC's CSV, columns are assigned by these names. Layout and association as in the tools of
+Sturm et al., *A Benchmark for the Evaluation of RGB-D SLAM Systems*, IROS 2012.
 """
 
 import re
@@ -20,14 +19,14 @@ from hicp_lib.core.rotations import matrices_from_quaternions, quaternions_from_
 
 MAX_DIFFERENCE_S = 0.02  # images and poses further apart in time do not belong together
 _UNIT_TOLERANCE = 0.01  # a quaternion's length may differ from 1 by this much: files are rounded
-_MAX_ABS = 1e20  # more is no time
-MAX_PLACE_M = 1e7  # more is no place on Earth
+_MAX_ABS = 1e20  # more is not a time
+MAX_PLACE_M = 1e7  # more is not a place on Earth
 _MAX_TIME_S = 1e11  # later than the year 5000: another unit
 _MAX_COLUMNS = 100  # of a table that has poses
-_SLOW_S = 5.0  # between two images: as many milliseconds are more usual
+_SLOW_S = 5.0  # between two images: in milliseconds this is more usual
 _LIST_COLUMNS = "timestamp filename"
 _POSE_COLUMNS = "timestamp tx ty tz qx qy qz qw"
-# Names of a coordinate: x, tx, p_x, p_RS_R_x [m]; of a quaternion's: qx, q_RS_x []
+# Names of a coordinate: x, tx, p_x, p_RS_R_x [m]; of a quaternion component: qx, q_RS_x []
 _COLUMN = re.compile(r"(?:([ptq])(?:\w*_)?)?([wxyz])")
 
 
@@ -150,12 +149,12 @@ def associate(
     a_s, b_s : array, shape (n,) or (m,)
         Increasing.
     max_difference_s : float, optional
-        Times further apart are not paired.
+        Times that differ by more are not paired.
 
     Returns
     -------
     a, b : array of int, shape (k,)
-        Rows of `a_s` and of `b_s` that are pairs, in the order of `a_s`.
+        Paired rows of `a_s` and `b_s`, in the order of `a_s`.
 
     Examples
     --------
@@ -182,28 +181,28 @@ def names_poses(path: str | Path) -> bool:
 
 
 def remarks(path: str | Path, times_s: np.ndarray) -> list[str]:
-    """What is odd about the times of a file that could be read.
+    """Warnings about the times of a readable file.
 
     Parameters
     ----------
     path : str or Path
     times_s : array, shape (n,)
-        As read: of lines with the same time only the first counts.
+        As read: of lines with the same time only the first is used.
 
     Returns
     -------
     list of str
-        How many lines repeat the time before; whether there are too few a second for times in seconds.
+        Number of lines with repeated times; whether there are too few per second for times in seconds.
     """
     n = sum(bool(re.match(r"\s*[-+.]?\d", line)) for line in _text(path).split("\n")) - len(times_s)
     step_s = np.median(np.diff(times_s)) if len(times_s) > 1 else 0.0
     looks = f"times are expected in seconds (these look like {_prefix(step_s)}seconds)"
-    told = [f"{n} lines repeat the time before and are passed over"] if n else []
+    told = [f"{n} lines repeat the time before and are skipped"] if n else []
     return [*told, f"{1 / step_s:.2g} frames per second; {looks}"] if step_s > _SLOW_S else told
 
 
 def _prefix(step: float) -> str:
-    """Of the unit in which the time between two images is such a number."""
+    """Prefix of the unit in which the time between two images is plausible."""
     return "milli" if step < 1e3 * _SLOW_S else "micro" if step < 1e6 * _SLOW_S else "nano"
 
 
@@ -215,7 +214,7 @@ def _text(path: str | Path) -> str:
 
 
 def _rows(path: str | Path, columns: str) -> Iterator[tuple[int, float, list[str]]]:
-    """Line number, time and further fields of every line that says something new."""
+    """Line number, time and further fields of every line with a new time."""
     width = len(columns.split())
     order, before_s, unit_s, is_csv = [*range(width)], -np.inf, 1.0, False
     for number, line in enumerate(_text(path).split("\n"), start=1):
@@ -247,7 +246,7 @@ def _rows(path: str | Path, columns: str) -> Iterator[tuple[int, float, list[str
 
 
 def _named_columns(line: str) -> list[int] | None:
-    """Which columns are those of `_POSE_COLUMNS`, if the line names them."""
+    """The indices of `_POSE_COLUMNS`, if the line names them."""
     names = re.sub(r"[\[(].*?[\])]", "", line.strip("# \r")).split("," if line.count(",") > 6 else None)
     found = [_COLUMN.fullmatch(name.strip(" ;")) for name in names[:_MAX_COLUMNS]]
     keys = [(m[1] or "qt"[m[2] != "w"]).replace("p", "t") + m[2] if m else "" for m in found]
@@ -258,7 +257,7 @@ def _named_columns(line: str) -> list[int] | None:
 
 def _number(path: str | Path, number: int, text: str) -> float:
     try:
-        value = float(text.replace("_", " "))  # Python's way of writing numbers is nobody's else
+        value = float(text.replace("_", " "))  # only Python writes numbers with underscores
     except ValueError:
         value = np.nan
     if not abs(value) < _MAX_ABS:

@@ -1,4 +1,4 @@
-"""Writing recordings: images one by one, then the lists that make them a recording."""
+"""Write recordings: images one by one, then the lists that complete the recording."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -18,14 +18,14 @@ JPEG_QUALITY = 95
 _MOST_UNITS = np.iinfo(np.uint16).max
 
 Poses = tuple[np.ndarray, np.ndarray]
-"""Times (m,) in seconds and T_base_cam (m, 4, 4); one pose is for all, m without times in order."""
+"""Times (m,) in seconds and T_base_cam (m, 4, 4); one pose is for all, m without times for m frames."""
 
 
 def write_recording(
     folder: str | Path, intrinsics: Camera, depth_units_per_m: float,
     frames: Iterable[tuple[float, np.ndarray, np.ndarray]], poses: Poses,
 ) -> None:  # fmt: skip
-    """Write a recording frame by frame; the folder is one only at the end.
+    """Write a recording frame by frame; the folder becomes a valid recording only at the end.
 
     Parameters
     ----------
@@ -36,8 +36,7 @@ def write_recording(
     depth_units_per_m : float
         1000 stores millimetres, up to 65 m.
     frames : iterable of (float, array, array)
-        Time, colour of shape (height, width, 3) and depth in metres, of which what is not finite is stored as
-        no depth.
+        Time, colour of shape (height, width, 3) and depth in metres; non-finite depth is stored as missing.
     poses : tuple of array
         As of `write_index`.
 
@@ -75,7 +74,7 @@ def write_index(
     poses: Poses,
     names: tuple[Sequence[str], Sequence[str]] | None = None,
 ) -> None:
-    """Make images of a folder a recording; `rgb.txt`, without which it is none, comes last.
+    """Write the lists and poses for images in a folder; `rgb.txt`, which completes the recording, comes last.
 
     Parameters
     ----------
@@ -85,9 +84,10 @@ def write_index(
     times_s : array, shape (n,)
         Of the images.
     poses : tuple of array
-        Times (m,) and camera coordinates to the robot's base frame (m, 4, 4); one is for all images.
+        Times (m,) and transforms from camera coordinates to the robot's base frame (m, 4, 4); a single one
+        applies to all images.
     names : (sequence of str, sequence of str), optional
-        Files of colour and of depth within the folder; by `rgb_name` and `depth_name` when left out.
+        Files of colour and depth in the folder; by default named by `rgb_name` and `depth_name`.
     """
     folder, numbers = Path(folder), range(len(times_s))
     rgb, depth = names or ([rgb_name(k) for k in numbers], [depth_name(k) for k in numbers])
@@ -178,12 +178,12 @@ def write_depth(path: str | Path, depth_m: np.ndarray, depth_units_per_m: float)
     depth_units_per_m : float
     """
     units = np.rint(depth_m * depth_units_per_m)
-    fits = (units >= 0) & (units <= _MOST_UNITS)  # what is not a number fits nowhere
+    fits = (units >= 0) & (units <= _MOST_UNITS)  # NaN does not fit either
     write_png(path, np.where(fits, units, 0).astype(np.uint16))
 
 
 def refuse_used_folder(folder: Path) -> None:
-    """Nothing is written over what is there.
+    """Refuse a folder with content, so that nothing is overwritten.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def refuse_used_folder(folder: Path) -> None:
     Raises
     ------
     InputError
-        If `folder` is a file, or holds anything.
+        If `folder` is a file, or not empty.
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: is there already; give a new or empty folder")

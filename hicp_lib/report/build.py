@@ -1,8 +1,8 @@
 """The whole report in one call: notebooks brought up to date, then the book.
 
-Weights that are fetched can be absent where there is no network. A notebook then runs on its other detectors;
-one that is about the detector alone is left out, and its page says why. What a user asked for by name is not
-dropped: its notebook fails, and says what is missing.
+Fetched weights can be absent without a network. A notebook then runs on its other detectors; a notebook about
+that detector only is left out, and its page says why. A detector that the user named is not dropped: its
+notebook fails, and says what is missing.
 """
 
 import time
@@ -20,7 +20,7 @@ from hicp_lib.report.notebooks import Notebook, parse_overrides, read_notebooks,
 from hicp_lib.report.run import Folders, Run
 from hicp_lib.report.runs import run_all
 
-_DETECTORS = ("names", "two names", "a name")  # how the words about a parameter begin that names detectors
+_DETECTORS = ("names", "two names", "a name")  # start of the description of a parameter that names detectors
 
 
 def make_report(
@@ -43,14 +43,14 @@ def make_report(
     sources : Path
         Holds `notebooks` and `book`.
     root : Path
-        `results` and `_build` are written below it.
+        Parent folder of `results` and `_build`.
     only : str, optional
         Name of a notebook: it runs, and those it needs by the profiles' `[after]`; no book is built.
 
     Returns
     -------
     Path or None
-        The first page of the book; None where it was not asked for.
+        The first page of the book; None if it was not requested.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def make_report(
 
 
 def _plan(profile: str, pairs: list[tuple[str, str]], folder: Path, only: str | None) -> list[Run]:
-    """Every notebook with its parameters, of three sources the last one counts: cell, profile, `pairs`."""
+    """Every notebook with its parameters from cell, profile and `pairs`, where later ones override."""
     notebooks = read_notebooks(folder)
     if only is not None:
         refuse_unknown("--only: notebook", only, [notebook.name for notebook in notebooks])
@@ -117,7 +117,7 @@ def _without_absent(
 
 
 def absent_weights(detector: str) -> list[str]:
-    """Names of the weight files that a detector, or a part of a combination, needs and that are not there.
+    """Names of the weight files that a detector, or a part of a combination, needs and that are absent.
 
     Examples
     --------
@@ -138,7 +138,7 @@ def without_absent(
     ----------
     parameters : dict of str to object
     asked_for : list of str
-        Names of parameters that a user set, which stay as they are.
+        Names of parameters that the user set, which are not changed.
 
     Returns
     -------
@@ -146,7 +146,7 @@ def without_absent(
     dropped : set of str
         Detectors whose weights are absent.
     can_run : bool
-        False where no detector is left in a list, or a single one is absent that no list offers.
+        False if no detector is left in a list, or a single one is absent that is in no list.
     """
     free = {name: value for name, value in parameters.items() if name not in asked_for}
     named = [one for value in free.values() for one in (value if isinstance(value, list) else [value])]

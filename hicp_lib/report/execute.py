@@ -1,7 +1,7 @@
-"""Runs one notebook by papermill, in a process of its own: `python -m hicp_lib.report.execute JOB.json`.
+"""Run one notebook with papermill, in a separate process: `python -m hicp_lib.report.execute JOB.json`.
 
-`hicp_lib.report.runs` starts it, holds the other end of its standard input, and checks what it left.
-When that end closes, however the parent died, this process ends the kernel and all its workers.
+`hicp_lib.report.runs` starts it, holds the other end of its standard input, and checks its results. When that
+end closes, for whatever reason, this process ends the kernel and all its workers.
 """
 
 import json
@@ -40,8 +40,8 @@ def main(job_path: str) -> int:
             request_save_on_cell_execute=False,
             start_timeout=START_TIMEOUT_S,
             kernel_manager_class=IpcKernelManager,
-            # What C++ libraries write to the terminal goes to the log; Python's own warnings stay visible.
-            # Nothing beside a notebook is imported: its key would not know of it.
+            # Output of C++ libraries to the terminal goes to the log; Python's own warnings stay visible.
+            # Nothing in the notebook's folder can be imported, since its key would not include it.
             extra_arguments=["--IPKernelApp.capture_fd_output=False", "--IPKernelApp.ignore_cwd=True"],
         )
     except PapermillExecutionError:

@@ -1,4 +1,4 @@
-"""The notebooks of the study: their declared parameters, and what each profile gives them."""
+"""The notebooks of the study: their declared parameters, and the values in each profile."""
 
 import ast
 import json
@@ -26,7 +26,7 @@ _MOST, _SHOWN = 2.0**63, 80  # numbers, characters of a refused value
 
 @dataclass(frozen=True)
 class Notebook:
-    """A notebook as it lies in the repository.
+    """A notebook in the repository.
 
     Attributes
     ----------
@@ -35,11 +35,11 @@ class Notebook:
     defaults : dict of str to object
         The value of every parameter by its name, as its `parameters` cell assigns them.
     source_sha256 : str
-        Hash of its cells' kinds, tags and text; outputs and other metadata do not count.
+        Hash of its cells' kinds, tags and text; outputs and other metadata are ignored.
     imports : frozenset of str
         Names of the modules it imports.
     allowed : dict of str to str
-        By a parameter's name, what the comment above it says in brackets: its unit and range.
+        By a parameter's name, its unit and range, from the brackets in the comment above it.
     """
 
     path: Path
@@ -55,7 +55,7 @@ class Notebook:
 
 @dataclass(frozen=True)
 class Profile:
-    """What one profile asks for.
+    """The settings of a profile.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ def read_notebook(path: Path) -> Notebook:
 
 
 def source_sha256(cells: list[Any]) -> str:
-    """Hash of what is run of a notebook, or was run of an executed one."""
+    """Hash of the code that a notebook runs, or that an executed one ran."""
     rows = [[cell.cell_type, cell.metadata.get("tags", []), cell.source] for cell in cells]
     return digest([row for row in rows if "injected-parameters" not in row[1]])  # papermill's own
 
@@ -192,12 +192,12 @@ def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> 
     given : dict of str to object
         Values by the parameters' names.
     origin : str
-        Where they are from, in words: the message begins with it.
+        Their origin, in words, for the start of the message.
 
     Raises
     ------
     InputError
-        Naming the unknown parameter and the known ones, or the type and range that were expected.
+        Names the unknown parameter and the known ones, or the expected type and range.
 
     Examples
     --------
@@ -223,7 +223,7 @@ def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> 
 
 
 def _fits(value: Any, default: Any, allowed: str) -> bool:
-    """Whether a value is of the kind of the default, and all numbers in it in the range that is allowed."""
+    """Whether a value has the type of the default, and all its numbers are in the allowed range."""
     if isinstance(default, bool | None):
         return default is None or isinstance(value, bool)
     if isinstance(default, int | float):
@@ -245,7 +245,7 @@ def _fits(value: Any, default: Any, allowed: str) -> bool:
 
 
 def _is_in_range(value: float, allowed: str) -> bool:
-    """Whether a number is in the range that words such as "1 or more" or "0 to below 1" say."""
+    """Whether a number is in a range in words, such as "1 or more" or "0 to below 1"."""
     low, high = _FROM.search(allowed), _UP_TO.search(allowed)
     least = float(low[low.lastindex or 0]) if low else 0.0 if "standard deviation" in allowed else -_MOST
     most = float(high[1]) if high else _MOST
@@ -283,7 +283,7 @@ def parse_overrides(pairs: list[tuple[str, str]], notebooks: list[Notebook]) -> 
     Returns
     -------
     dict of str to dict
-        By every notebook's name, the values that were given for it.
+        By every notebook's name, the values given for it.
 
     Raises
     ------

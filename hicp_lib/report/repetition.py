@@ -1,4 +1,4 @@
-"""Whether a run says what the reference run said: value by value, of what its pages show.
+"""Compare a run with the reference run, value by value, for everything that its pages show.
 
 The reference run of a profile lies in `data/reference/PROFILE/`, a folder per notebook: its `values.json`,
 the tables it shows, and its stamp; `tools/reference.py` writes it.
@@ -14,7 +14,7 @@ import pandas as pd
 
 from hicp_lib.core.files import read_json
 
-TOLERANCE = 1e-6  # relative: other processors round elsewhere
+TOLERANCE = 1e-6  # relative, since other processors round differently
 WITHIN_TOLERANCE = ["same", "within 1e-6", "within the interval"]
 VERDICTS = [*WITHIN_TOLERANCE, "outside"]
 MEASURED_NAME = "time"
@@ -24,7 +24,7 @@ _BOUND = re.compile(r"(?:.*_)?(low|high)(?:_.*)?")
 
 
 def is_measured(name: str) -> bool:
-    """Whether a table, a column or a value holds times, which no other run can repeat.
+    """Whether a table, a column or a value contains measured times, which cannot be repeated.
 
     Examples
     --------
@@ -35,17 +35,17 @@ def is_measured(name: str) -> bool:
 
 
 def outputs(folder: Path, tables: list[str]) -> dict[str, Output]:
-    """What a notebook recorded, and the numbers it showed, by name: value and bounds of the interval, or NaN.
+    """The values and tables of a notebook, by name: value and bounds of the interval, or NaN.
 
-    Bounds are the columns `low` and `high` (or `x_low`, `low_m` ...) that follow that of the value, and are
-    no outputs themselves.
+    Bounds are the columns `low` and `high` (or `x_low`, `low_m` ...) after that of the value; they are not
+    outputs themselves.
 
     Parameters
     ----------
     folder : Path
         Of its results.
     tables : list of str
-        File names of tables; those that are not there have no outputs.
+        File names of tables; missing ones have no outputs.
 
     Returns
     -------
@@ -100,12 +100,12 @@ def verdict(reference: Output | None, own: Output | None) -> str:
 
 
 def compare(reference: Path, results: Path) -> tuple[pd.DataFrame, dict[str, str]]:
-    """Every output of the reference run, or of this one, beside the other's.
+    """Every output of the reference run, or of this one, with the other's.
 
     Parameters
     ----------
     reference, results : Path
-        A folder per notebook in each.
+        Each with a folder per notebook.
 
     Returns
     -------

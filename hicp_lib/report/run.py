@@ -1,4 +1,4 @@
-"""A run of a notebook: what it is made of, and the process it happens in."""
+"""A run of a notebook: its inputs, and its process."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ WALL_LIMIT_S = 2 * 3600
 
 
 class RunError(RuntimeError):
-    """A notebook failed. The message is one line that says where and where its copy lies."""
+    """A notebook failed. The message is one line that says where, and where its copy is."""
 
 
 @dataclass(frozen=True)
 class Folders:
-    """Where the runs of one profile come from and go to.
+    """Input and output folders of the runs of one profile.
 
     Attributes
     ----------
     sources : Path
         Holds `notebooks` and `book`.
     root : Path
-        Results and the built book go below it.
+        Parent folder of results and the built book.
     profile : str
         Its name.
     """
@@ -54,7 +54,7 @@ class Folders:
 
 @dataclass(frozen=True)
 class Run:
-    """One notebook with everything it runs with.
+    """One notebook with its parameters and predecessors.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Run:
 
 
 class Children:
-    """The running processes; leaving the context for any reason ends them all."""
+    """The running processes; leaving the context for any reason terminates them all."""
 
     def __init__(self) -> None:
         self._pipes: set[IO[bytes]] = set()
@@ -86,7 +86,7 @@ class Children:
             pipe.close()
 
     def execute(self, run: Run, copy: Path, staging: Path, folders: Folders) -> int | None:
-        """Run the notebook into `copy`; the exit code, or None when it hit the wall limit.
+        """Run the notebook into `copy`; returns the exit code, or None after the time limit.
 
         Parameters
         ----------
@@ -111,8 +111,8 @@ class Children:
         command = [sys.executable, "-m", "hicp_lib.report.execute", str(staging / "job.json")]
         with open(staging / "log.txt", "wb") as log, tempfile.TemporaryDirectory(prefix="hicp-") as private:
             environment = _environment(staging, folders, private)
-            # In a session of its own: what ends the report's whole process group must not end this one
-            # before it has ended the kernel's workers.
+            # In a separate session: a signal to the report's process group must not end this process before
+            # it has ended the kernel's workers.
             streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": log, "stderr": log}
             process = subprocess.Popen(command, **streams, env=environment, start_new_session=True)
             pipe = cast(IO[bytes], process.stdin)
@@ -128,7 +128,7 @@ class Children:
 
 
 def _environment(staging: Path, folders: Folders, private: str) -> dict[str, str]:
-    """A kernel's environment: nothing of the user's own set-up may move a number or a pixel."""
+    """A kernel's environment: the user's own configuration must not change a number or a pixel."""
     import matplotlib
 
     return child_environment() | {

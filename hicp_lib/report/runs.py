@@ -1,9 +1,8 @@
 """Runs of notebooks: only when something they depend on changed, whole or not at all.
 
-A run happens in a staging folder. Only when every cell completed, nothing was written to
-stderr and the results carry the parameters of the run, it takes the place of the last one;
-its stamp is written last. No stamp, another key, or an output that is not the stamped one:
-the notebook runs again.
+A run happens in a staging folder. It replaces the last one only if every cell completed, nothing was written
+to stderr, and the results have the run's parameters; its stamp is written last. Without a stamp, with another
+key, or if an output differs from the stamped one, the notebook runs again.
 """
 
 import json
@@ -32,9 +31,9 @@ from hicp_lib.report.schedule import needed, run_when_ready
 from hicp_lib.study import provenance
 
 Earlier = Callable[[], list[str]]
-"""Digests of the runs before one, as they are when it is called."""
+"""Returns the current digests of the runs before one."""
 MEMORY_PER_RUN_BYTES = 2 * 10**9
-"""What one notebook may need with its workers; the study's largest takes 0.7 GB without them."""
+"""Memory that one notebook may need with its workers; the study's largest takes 0.7 GB without them."""
 
 
 def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None], only: str | None = None) -> None:
@@ -43,17 +42,17 @@ def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None], only:
     Parameters
     ----------
     runs : list of Run
-        Those they name in `after` run before them; what is not among them is left out.
+        Those named in `after` run before them; names that are not among them are ignored.
     folders : Folders
     log : callable
         Takes one line per notebook.
     only : str, optional
-        Name of the notebook that is wanted: it and those it needs run; all are, where it is left out.
+        Name of the requested notebook, which runs with those it needs; by default all.
 
     Raises
     ------
     RunError
-        If a notebook failed; the others are still brought to their end.
+        If a notebook failed; the others still finish.
     InputError
         If a parameter names a file or folder that does not exist.
     """
@@ -62,7 +61,7 @@ def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None], only:
     if only is not None:
         after = {name: after[name] for name in named if name in needed(after, only)}
     for name in after:
-        _input_paths(named[name])  # a mistake is told now, not when the notebook's turn comes
+        _input_paths(named[name])  # report a mistake now, not when it is the notebook's turn
     folders.executed.mkdir(parents=True, exist_ok=True)
     for left_behind in folders.executed.glob(".run-*"):
         shutil.rmtree(left_behind, ignore_errors=True)
@@ -84,7 +83,7 @@ def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None], only:
 
 
 def n_parallel() -> int:
-    """Notebooks to run at a time: one per core this process may use, as far as there is memory for them."""
+    """Number of notebooks in parallel: one per core of this process, limited by memory."""
     fitting = psutil.virtual_memory().available // MEMORY_PER_RUN_BYTES
     return max(1, min(usable_cores(), fitting))
 
@@ -94,7 +93,7 @@ class _SkippedError(Exception):
 
 
 def _made(names: list[str], folders: Folders) -> list[str]:
-    """Of earlier notebooks, what tells their results from others."""
+    """Digests that identify the results of earlier notebooks."""
     return [digest([read_stamp(folders.executed / f"{name}.json"), outputs(name, folders)]) for name in names]
 
 
@@ -114,7 +113,7 @@ def _bring_up_to_date(
 
 
 def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
-    """Hashes of everything the outcome of a run depends on, by what they stand for.
+    """Hashes of everything that a run depends on, by name.
 
     Parameters
     ----------
@@ -160,7 +159,7 @@ def _input_paths(run: Run) -> dict[str, Path]:
 
 
 def why_stale(name: str, key: dict[str, Any], folders: Folders) -> str | None:
-    """What makes a new run necessary, in words; None when the last run still holds.
+    """Why a new run is necessary, in words; None if the last run is still valid.
 
     Parameters
     ----------
@@ -179,7 +178,7 @@ def why_stale(name: str, key: dict[str, Any], folders: Folders) -> str | None:
 
 
 def read_stamp(path: Path) -> dict[str, Any] | None:
-    """The stamp of what was made last: its `key` and `outputs`; None where nothing was made whole."""
+    """The stamp of the last run: its `key` and `outputs`; None without a complete run."""
     try:
         stamp = json.loads(path.read_bytes())
         return stamp if isinstance(stamp["outputs"], dict) and stamp["key"] else None
@@ -194,10 +193,10 @@ def outputs(name: str, folders: Folders) -> dict[str, str]:
 
 
 def _run_notebook(run: Run, key: dict, earlier: Earlier, folders: Folders, children: Children) -> None:
-    """Run a notebook and put its outcome, stamped with its key, in place of the last one.
+    """Run a notebook and replace the last run by its outcome, stamped with its key.
 
     Raises RunError if a cell failed, wrote to stderr or took too long, the results are not those of this run,
-    or something its key stands for was changed meanwhile.
+    or something in its key was changed meanwhile.
     """
     name = run.notebook.name
     prefix, parent = f".run-{name}-", folders.executed
@@ -219,7 +218,7 @@ def _run_notebook(run: Run, key: dict, earlier: Earlier, folders: Folders, child
 
 
 def _discard(name: str, folders: Folders) -> None:
-    """Forget the last run. The stamp goes first: from here on it counts as not run."""
+    """Discard the last run. The stamp is removed first, so that it counts as not run from here on."""
     (folders.executed / f"{name}.json").unlink(missing_ok=True)
     (folders.executed / f"{name}.ipynb").unlink(missing_ok=True)
     for leftover in (folders.executed / "failed").glob(f"{name}.*"):
@@ -228,7 +227,7 @@ def _discard(name: str, folders: Folders) -> None:
 
 
 def _keep_failed(copy: Path, staging: Path, folders: Folders) -> str:
-    """Keep a failed run's copy and log for reading; the words that say where."""
+    """Keep a failed run's copy and log; returns the words that say where."""
     failed = folders.executed / "failed"
     failed.mkdir(exist_ok=True)
     for path in (copy, staging / "log.txt"):
@@ -241,7 +240,7 @@ def _check(run: Run, status: int | None, copy: Path, staging: Path) -> None:
     """Raise RunError unless the executed copy and its results are whole."""
     if status is None:
         took = f"took longer than {raised(WALL_LIMIT_S):g} s and was stopped"
-        raise RunError(f"{took}; run it again to go on, {RAISE}")
+        raise RunError(f"{took}; run it again to continue, {RAISE}")
     if not copy.is_file():
         lines = (staging / "log.txt").read_text(errors="replace").strip().splitlines()
         raise RunError(f"did not run: {lines[-1] if lines else f'exit code {status}'}")
@@ -257,7 +256,7 @@ def _check(run: Run, status: int | None, copy: Path, staging: Path) -> None:
 
 
 def _refuse_changed(run: Run, key: dict[str, Any], copy: Path, earlier: Earlier) -> None:
-    """Raise RunError if what was run, or what there is now, is not what the key says; InputError if gone."""
+    """Raise RunError if what was run, or is there now, differs from the key; InputError if it is gone."""
     now = run_key(replace(run, notebook=read_notebook(run.notebook.path)), earlier())
     if source_sha256(nbformat.read(copy, as_version=4).cells) != key["notebook"]:
         now["notebook"] = "another was run"

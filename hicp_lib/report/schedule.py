@@ -1,4 +1,4 @@
-"""Which job starts when: some at a time, each after those it needs."""
+"""Schedule jobs: several in parallel, each after those it needs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
@@ -7,7 +7,7 @@ from graphlib import TopologicalSorter
 
 
 def needed(after: Mapping[str, Sequence[str]], name: str) -> set[str]:
-    """A job and all that come before it, directly or through others.
+    """A job and all its predecessors, direct and indirect.
 
     Examples
     --------
@@ -23,10 +23,10 @@ def run_when_ready(
     pool: Executor,
     n_parallel: int,
 ) -> dict[str, Future]:
-    """Run every job once those before it have ended, well or not; its ended future by its name.
+    """Run every job after its predecessors have ended, successfully or not; returns ended futures by name.
 
-    Of those that are ready, the one at the head of the longest chain of others goes first: started late, it
-    would keep them all waiting; among equals the first in `after`.
+    Of the jobs that are ready, the one with the longest chain of successors starts first, since they all wait
+    for it; among equals the first in `after`.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def run_when_ready(
         Takes a name and the ended futures of those before it; called in the pool.
     pool : Executor
     n_parallel : int
-        Jobs at a time; as many as the pool has workers, so that none is queued before its turn.
+        Jobs at a time; equal to the pool's number of workers, so that none is queued too early.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def run_when_ready(
 
 
 def _urgency(after: Mapping[str, Sequence[str]]) -> list[str]:
-    """All jobs, by falling length of the longest chain that begins with each."""
+    """All jobs, by decreasing length of the longest chain that starts with each."""
 
     @cache
     def length(name: str) -> int:

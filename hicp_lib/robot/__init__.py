@@ -1,4 +1,4 @@
-"""The robot: its kinematics, the space around its skin, and a controller that gives way."""
+"""The robot: its kinematics, the space around its skin, and a controller that avoids obstacles."""
 
 from hicp_lib.core.extras import require
 

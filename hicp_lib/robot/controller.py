@@ -1,9 +1,9 @@
-"""The reactive controller: one hand stays at its post, and all joints give way to obstacles.
+"""The reactive controller: one hand holds a target position (its *post*), and all joints avoid obstacles.
 
 Every 20 ms a quadratic program chooses the velocities of the ten joints of torso and arm: the hand is
-drawn to its post and the joints to a rest posture, smoothly, within the bounds of `velocity_bounds` and
-those of the shoulder's cables. After Nguyen et al. (2018), with the costs of the version the authors used
-in 2022 (robotology/react-control); solved by DAQP. This is no safety function.
+attracted to its post and the joints to a rest posture, smoothly, within the bounds of `velocity_bounds` and
+those of the shoulder's cables. After Nguyen et al. (2018), with the costs of the version the authors used in
+2022 (robotology/react-control); solved by DAQP. This is not a safety function.
 """
 
 from dataclasses import dataclass, field
@@ -23,33 +23,34 @@ class NoSolution(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Settings:
-    """How the controller behaves; `PUBLISHED` has the published numbers.
+    """Parameters of the controller; `PUBLISHED` has the published values.
 
     Attributes
     ----------
     period_s : float
         Time between two commands.
     fastest_rad_s : float
-        Of every joint (30 degrees per second in 2022, 20 in 2018).
+        Maximum speed of every joint (30 degrees per second in 2022, 20 in 2018).
     retreat_rad_s : float
         Velocity `v_a` of the retreat per metre of lever arm (50 degrees per second).
     gain : float
-        Factor on it (published: 0.5 for what is seen, 1.5 for touch; ours acts on less, see `neutral`).
+        Factor on it (published: 0.5 for vision, 1.5 for touch; ours acts on smaller magnitudes, see
+        `neutral`).
     onset, neutral : float
-        Magnitudes at which an obstacle begins to slow joints that turn towards it, and from which on it
-        pushes them back (ours; published: the push begins at 0.2, at full strength).
+        Magnitudes from which an obstacle slows joints that turn towards it, and from which it pushes them
+        back (ours; published: the push starts at 0.2, at full strength).
     guard : float
-        Part of a joint's range in which it slows down towards its limit.
+        Fraction of a joint's range in which it slows down towards its limit.
     post_weight, rest_weight, smooth_weight : float
-        Costs of the hand's velocity error (m/s)^2, of the joints' from the way to rest (rad/s)^2, and of
-        changes of velocity (rad/s)^2.
+        Weights of the hand's velocity error (m/s)^2, of the joints' velocity error towards rest (rad/s)^2,
+        and of changes of velocity (rad/s)^2.
     approach_s : float
-        The hand wants to be at its post in this time, ... (ours)
+        Time in which the hand is to reach its post ... (ours)
     approach_m_s : float
         ... but no faster than this (ours).
     rest_s : float
-        The joints want to be at rest in this time; with `rest_weight` (published: 0.01) it is such that they
-        do not swing about it (ours).
+        Time in which the joints are to reach rest; with `rest_weight` (published: 0.01) chosen so that they
+        do not oscillate (ours).
 
     Examples
     --------
@@ -73,28 +74,28 @@ class Settings:
 
 
 PUBLISHED = Settings(gain=0.5, onset=0.2, neutral=0.0, rest_weight=0.01, rest_s=0.3)
-"""The form of Nguyen et al. (2018), at the joint speed of 2022."""
+"""The parameters of Nguyen et al. (2018), with the joint speed of 2022."""
 
 
 @dataclass(eq=False)
 class Controller:
-    """Chooses joint velocities for torso and one arm; remembers the last ones.
+    """Computes joint velocities for torso and one arm; keeps the last ones as state.
 
     Attributes
     ----------
     icub : ICub
         The robot.
     post_m : array, shape (3,)
-        Where the palm wants to be, root frame.
+        Target position of the palm, root frame.
     rest_rad : array, shape (10,)
-        Angles the joints are drawn to.
+        Angles to which the joints are attracted.
     side : str
         "left" or "right", the arm that is controlled.
     settings : Settings
 
     Examples
     --------
-    At its post, with nobody near, the arm stands still:
+    At its post, without obstacles, the arm stands still:
 
     >>> from hicp_lib.robot.home import HOME_M, home_posture
     >>> from hicp_lib.robot.kinematics import load_icub
@@ -118,7 +119,7 @@ class Controller:
         Parameters
         ----------
         posture : Posture
-            The robot's now.
+            The robot's current one.
         obstacles : list of Obstacle
 
         Returns
@@ -129,7 +130,8 @@ class Controller:
         Raises
         ------
         NoSolution
-            If the angles are not finite, or no velocities satisfy all bounds. The next call starts from rest.
+            If the angles are not finite, or no velocities satisfy all bounds. The next call then starts from
+            rest.
         """
         q, last = posture.angles(self.side), self._last
         self.stop()
@@ -139,12 +141,12 @@ class Controller:
         chosen = solve_problem(self._problem(q, last, lowest, highest), solver="daqp").x
         if chosen is None or not np.isfinite(chosen).all():
             raise NoSolution("no velocities satisfy the bounds of joints and cables")
-        # The solver keeps bounds to its tolerance only.
+        # The solver satisfies bounds only within its tolerance.
         self._last = np.clip(chosen, lowest, highest)
         return self._last.copy()
 
     def stop(self) -> None:
-        """Say that the arm stands still: the next velocities start from rest."""
+        """Reset after the arm was stopped: the next velocities start from rest."""
         self._last = np.zeros(len(ARM_JOINTS))
 
     def _bounds(
@@ -157,7 +159,7 @@ class Controller:
         return self._within_cables(q, *shaped)
 
     def _pushes(self, posture: Posture, obstacle: Obstacle) -> np.ndarray:
-        """What an obstacle wants of the controlled joints: those of another limb do not move."""
+        """Velocities by which an obstacle pushes the controlled joints; none for another limb's obstacle."""
         chain, link = self.icub.parts[obstacle.part]
         q = posture.angles(chain)
         jacobian = self.icub.chains[chain].jacobian(link, q, obstacle.point_m)
@@ -168,7 +170,7 @@ class Controller:
         return pushes(shared, normal, self.settings.gain * self.settings.retreat_rad_s)
 
     def _cable_bounds(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The cables' inequalities `rows @ velocities <= most`; outside them, at least no farther."""
+        """The cables' inequalities `rows @ velocities <= most`; outside them, at least no further out."""
         chain = self.icub.chains[self.side]
         length = chain.cables @ q
         room = np.concatenate([chain.cables_upper_rad - length, length - chain.cables_lower_rad])
@@ -178,9 +180,9 @@ class Controller:
     def _within_cables(
         self, q: np.ndarray, lowest: np.ndarray, highest: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds relaxed towards standing still until the cables allow what they force joints to do.
+        """Relax velocity bounds towards zero until they are compatible with the cables.
 
-        Without it a retreat that pulls a cable would leave no velocities at all, and stop the arm.
+        Otherwise a retreat that pulls a cable would leave no feasible velocities, and stop the arm.
         """
         forced = np.clip(0, lowest, highest)
         rows, most = self._cable_bounds(q)

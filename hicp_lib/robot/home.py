@@ -1,4 +1,4 @@
-"""Where the robot holds its hand when nobody is near."""
+"""The rest posture and the hand's target position (post)."""
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -8,11 +8,11 @@ from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
 
 HOME_M = {"left": (-0.30, -0.20, 0.05), "right": (-0.30, 0.20, 0.05)}
-"""Places of the palms in the root frame in front of the robot (robotology/peripersonal-space, 2015)."""
+"""Positions of the palms in the root frame in front of the robot (robotology/peripersonal-space, 2015)."""
 
 _REACHED_M = 1e-3
-_POSTURE_WEIGHT = 1e-4  # metres per radian: a little chooses among the many postures that reach the post
-_MARGIN = 0.05  # share of a joint's range next to its limits, where the controller slows it down
+_POSTURE_WEIGHT = 1e-4  # metres per radian: small, to select among the many postures that reach the post
+_MARGIN = 0.05  # fraction of a joint's range next to its limits, where the controller slows it down
 _ELBOW_BENT_RAD = np.deg2rad([-25.0, 20.0, 0.0, 50.0, 0.0, 0.0, 0.0])
 
 
@@ -25,7 +25,7 @@ def home_posture(icub: ICub, side: str = "left", post_m: np.ndarray | None = Non
     side : str, optional
         "left" or "right".
     post_m : array, shape (3,), optional
-        In the root frame; `HOME_M` when left out.
+        In the root frame; by default `HOME_M`.
 
     Returns
     -------
@@ -34,7 +34,7 @@ def home_posture(icub: ICub, side: str = "left", post_m: np.ndarray | None = Non
     Raises
     ------
     InputError
-        If the palm cannot get there within the limits of the joints without the torso's help.
+        If the palm cannot reach it within the joint limits with an upright torso.
 
     Examples
     --------
@@ -55,6 +55,6 @@ def home_posture(icub: ICub, side: str = "left", post_m: np.ndarray | None = Non
     margin = _MARGIN * (high - low)
     found = least_squares(misses, _ELBOW_BENT_RAD, bounds=(low + margin, high - margin))
     if np.linalg.norm(misses(found.x)[:3]) > _REACHED_M:
-        raise InputError(f"the {side} palm cannot be held at {post.tolist()} m; choose a nearer place")
+        raise InputError(f"the {side} palm cannot be held at {post.tolist()} m; choose a nearer position")
     bent = Posture(left_rad=_ELBOW_BENT_RAD, right_rad=_ELBOW_BENT_RAD)
     return bent.moved(side, np.concatenate([np.zeros(3), found.x]))

@@ -1,4 +1,4 @@
-"""Kinematics of the iCub: where its links, its camera and points of its skin are.
+"""Kinematics of the iCub: poses of its links and its camera, and positions of its skin.
 
 Root frame: origin on the axis of torso pitch, between the legs; metres, x backward, y to the robot's
 right, z up. Angles in radians, without clamping to the limits. Every chain begins at the root with the
@@ -36,11 +36,11 @@ class Chain:
     joints : tuple of str
         n of them, in the order of the angles.
     links : tuple of str
-        The frames after each row of the table.
+        The frames after each row of the Denavit-Hartenberg table.
     limits_rad : array, shape (n, 2)
         Lowest and highest angle of every joint.
     cables : array, shape (k, n)
-        Sums of angles that cables bound (arms only, else k = 0).
+        Sums of angles limited by cables (arms only, else k = 0).
     cables_lower_rad, cables_upper_rad : array, shape (k,)
         `lower <= cables @ q <= upper`.
     """
@@ -108,7 +108,7 @@ class Chain:
         return {link: self._data.oMf[frame].homogeneous for link, frame in self._frames.items()}
 
     def jacobian(self, link: str, q_rad: np.ndarray, points_link_m: np.ndarray | None = None) -> np.ndarray:
-        """How points fixed to a link move with the joints.
+        """Jacobian of points fixed to a link.
 
         Parameters
         ----------
@@ -117,7 +117,7 @@ class Chain:
         q_rad : array, shape (n,)
             Angles in the order of `joints`.
         points_link_m : array, shape (..., 3), optional
-            Points in the link's frame; its origin when left out.
+            Points in the link's frame; by default its origin.
 
         Returns
         -------
@@ -147,7 +147,7 @@ class Chain:
 
 @dataclass(frozen=True, eq=False)
 class ICub:
-    """An iCub: its chains, its camera holders and where the parts of its skin are fixed.
+    """An iCub: its chains, its camera holders, and the links that carry its skin.
 
     Attributes
     ----------
@@ -190,8 +190,8 @@ class ICub:
 def load_icub(head: str = "v2", arm: str = "v1", limits: str = "table") -> ICub:
     """An iCub of the given versions.
 
-    Which versions the paper's robot has is not published: head "v2" (the one the camera holders were
-    measured on) and arm "v1" (the one whose table reproduces logged positions of a real robot) are assumed.
+    The versions of the paper's robot are not published; assumed are head "v2" (on which the camera holders
+    were measured) and arm "v1" (whose table reproduces logged positions of a real robot).
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """The avoidance loop: keypoints in, joint velocities out, one cycle every 20 ms.
 
-`Perception` and `Command` are all that a robot has to give and to take: a lab puts its own middleware
-(YARP, ROS) around `AvoidanceLoop.cycle`. Nothing here is a safety function.
+`Perception` and `Command` are the whole interface to a robot: a lab wraps its own middleware (YARP, ROS)
+around `AvoidanceLoop.cycle`. Nothing here is a safety function.
 """
 
 from dataclasses import dataclass, field
@@ -16,12 +16,12 @@ from hicp_lib.robot.skin import Skin, read_skin
 from hicp_lib.robot.tracking import KeypointTracker
 
 FREE, AVOIDING, STOPPED = "free", "avoiding", "stopped"
-"""What a command says of itself: nothing is near, something is, or the arm stands still (see `reason`)."""
+"""Status of a command: nothing is near, something is, or the arm stands still (see `reason`)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Perception:
-    """What a camera saw.
+    """Keypoints detected in one image.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Perception:
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What the robot is to do until the next command.
+    """Joint velocities until the next command.
 
     Attributes
     ----------
@@ -73,14 +73,14 @@ class Command:
 
 @dataclass(frozen=True, eq=False)
 class Threat:
-    """What the skin made of the keypoints.
+    """Activations of the skin by keypoints, and the resulting obstacles.
 
     Attributes
     ----------
     activations : array, shape (n,)
         Of every taxel.
     obstacles : list of Obstacle
-        Of the parts, from the magnitude on at which joints begin to slow down.
+        At most one per part, from the magnitude at which joints begin to slow down.
     """
 
     activations: np.ndarray
@@ -88,29 +88,29 @@ class Threat:
 
     @property
     def is_close(self) -> bool:
-        """Whether any taxel's activation is above the threshold at which robots of this kind react."""
+        """Whether any taxel's activation is above the threshold at which the published controller reacts."""
         return any(obstacle.magnitude > ACTIVATION_THRESHOLD for obstacle in self.obstacles)
 
 
 @dataclass(eq=False)
 class AvoidanceLoop:
-    """Tracker, skin and controller, in the order they work; one object per robot and stream.
+    """Tracker, skin and controller in sequence; one object per robot and stream.
 
     Attributes
     ----------
     controller : Controller
-        Knows the robot, the arm and its post.
+        For a robot, one of its arms, and its post.
     skin : Skin
         The robot's taxels.
     sensing : ReceptiveField
-        What a taxel senses.
+        The taxels' receptive field.
     tracker : KeypointTracker
-        Which keypoints are believed.
+        Filters keypoints over time.
     avoids : bool
-        Whether to give way at all; without it the arm keeps its post, and threats are still reported.
+        Whether to avoid at all; if not, the arm keeps its post, and threats are still reported.
     blind_after_s : float
-        The arm stops when the newest perception is older than this. Empty ones count: they say that nobody
-        is seen.
+        The arm stops when the newest perception is older than this. Empty ones count: they mean that nobody
+        is detected.
 
     Examples
     --------
@@ -137,9 +137,9 @@ class AvoidanceLoop:
     def cycle(
         self, now_s: float, posture: Posture, perception: Perception | None = None
     ) -> tuple[Command, Threat]:
-        """One cycle: take in what was perceived since the last one, if anything, and decide.
+        """One cycle: process a new perception, if there is one, and compute a command.
 
-        Whatever the perception holds, the command is finite and within all bounds.
+        For any perception, the command is finite and within all bounds.
 
         Parameters
         ----------
@@ -167,7 +167,7 @@ class AvoidanceLoop:
         return Command(now_s, velocities, status), threat
 
     def threat(self, now_s: float, posture: Posture) -> Threat:
-        """Activations by what is believed now, and the obstacles they add up to.
+        """Activations by the currently trusted keypoints, and the resulting obstacles.
 
         Parameters
         ----------

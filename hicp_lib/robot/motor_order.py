@@ -1,4 +1,4 @@
-"""Joint angles as a lab's iCub reports them: degrees, per motor board, the torso the other way round.
+"""Joint angles as a lab's iCub reports them: degrees, per motor board, the torso in reverse order.
 
 The torso's board counts yaw, roll, pitch (joints 0, 1, 2); kinematics go pitch, roll, yaw. The head's
 board reports neck pitch, neck roll, neck yaw, then eyes tilt, version and vergence; an arm's board seven
@@ -22,7 +22,7 @@ def from_motor_order(torso_deg: ArrayLike, limb_deg: ArrayLike, joints: tuple[st
     torso_deg : array, shape (..., 3)
         Yaw, roll, pitch.
     limb_deg : array, shape (..., n - 3 or more)
-        Neck pitch, roll, yaw, or the arm's seven; what follows (eyes, fingers) is left out.
+        Neck pitch, roll, yaw, or the arm's seven; further ones (eyes, fingers) are ignored.
     joints : tuple of str
         The chain's n, `HEAD_JOINTS` or `ARM_JOINTS` of `hicp_lib.robot.kinematics`.
 

@@ -1,10 +1,11 @@
-"""Peripersonal space: how much every taxel of the skin is concerned by the points around it.
+"""Peripersonal space: the activation of every taxel of the skin by the points around it.
 
-Each taxel looks at a truncated cone about its normal. A point inside it activates the taxel by its
-distance alone: the variant of Roncone et al. (2015) that the paper uses, without time to contact. How
-strongly, was learned by the robot as a histogram of "did an object at this distance touch me later?";
-here it is the hand-made histogram of reach 45 cm published beside it (data/README.md names the source),
-smoothed by Parzen windows. Taxels above a threshold are summed up, part by part, to one obstacle.
+The receptive field of a taxel is a truncated cone about its normal. A point inside it activates the taxel
+depending on its distance only: the variant of Roncone et al. (2015) that the paper uses, without time to
+contact. The activation is the probability that an object at this distance touches the skin later. The
+original robot learned it as a histogram; here it is the hand-made histogram with a reach of 45 cm published
+with it (data/README.md names the source), smoothed by Parzen windows. For each part, the taxels above a
+threshold are summarised as one obstacle.
 """
 
 from dataclasses import dataclass
@@ -22,26 +23,26 @@ NEGATIVES = np.full(20, 100)
 """Events per bin of distance, 20 bins from -5 to 45 cm: followed by a touch, and not."""
 
 ACTIVATION_THRESHOLD = 0.2
-"""Taxels above it belong to an obstacle, if nothing else is said; reached at about 19 cm."""
+"""Default threshold above which taxels belong to an obstacle; reached at about 19 cm."""
 
 _TABLE_STEP_M = 1e-4
 _TABLE_M = np.arange(-0.2, 0.6, _TABLE_STEP_M)
 _NEGLIGIBLE = 1e-3
-_BLOCK = 136  # points at once: intermediate arrays of one person's fit the processor's cache
+_BLOCK = 136  # points at once: intermediate arrays for one person fit into the processor's cache
 
 
 @dataclass(frozen=True)
 class ReceptiveField:
-    """What a taxel senses.
+    """The receptive field of a taxel.
 
     Attributes
     ----------
     half_angle_rad, skin_radius_m : float
-        Of the cone: its opening, and its radius where it meets the skin (50 degrees and 7 cm since September
-        2016; 40 degrees and 5 cm before). It is round here and opens behind the skin as in front of it; the
-        robot's software cuts it square, along axes of the taxel's that are not published.
+        The cone's opening, and its radius at the skin (50 degrees and 7 cm since September 2016; 40 degrees
+        and 5 cm before). It is round here and also opens behind the skin; the robot's software uses a square
+        cross-section, along axes of the taxels that are not published.
     point_radius_m : float
-        Every point is a ball of this radius (3.5 cm: Nguyen et al. 2018, around keypoints).
+        Every point is a sphere of this radius (3.5 cm: Nguyen et al. 2018, around keypoints).
 
     Examples
     --------
@@ -66,32 +67,32 @@ class ReceptiveField:
 
     @cached_property
     def reach_m(self) -> float:
-        """Distance of a point beyond which nothing is activated by more than 0.001."""
+        """Distance of a point beyond which activations are below 0.001."""
         return float(_TABLE_M[np.flatnonzero(self.table > _NEGLIGIBLE)[-1]]) + self.point_radius_m
 
     def activations(
         self, positions_m: np.ndarray, normals: np.ndarray, points_m: np.ndarray, gains: np.ndarray
     ) -> np.ndarray:
-        """Activation of every taxel: the most that any of the points causes.
+        """Activation of every taxel: the maximum over the points.
 
         Parameters
         ----------
         positions_m, normals : array, shape (n, 3)
             Taxels, in the same frame as the points.
         points_m : array, shape (m, 3)
-            What is not finite is left out.
+            Non-finite points are left out.
         gains : array, shape (m,)
             Factor on the response to each point, at least 0.
 
         Returns
         -------
         array, shape (n,), dtype float32
-            0 where nothing is near.
+            0 if nothing is near.
         """
         points, gains = self._near(positions_m, np.asarray(points_m, dtype=float), np.asarray(gains))
         if not len(points):
             return np.zeros(len(positions_m), dtype=np.float32)
-        # About the middle of the points, so that single precision is enough
+        # Relative to the centre of the points, so that single precision is enough
         middle = points.mean(axis=0)
         taxels, normals = (positions_m - middle).astype(np.float32), normals.astype(np.float32)
         points, gains = (points - middle).astype(np.float32), gains.astype(np.float32)
@@ -109,7 +110,7 @@ class ReceptiveField:
         square = (-2 * taxels) @ points.T
         square += np.einsum("ij,ij->i", taxels, taxels)[:, None] + np.einsum("ij,ij->i", points, points)
         np.maximum(square, 0, out=square)
-        # The square of the distance at which the cone ends on the way to the point
+        # The square of the distance at which the cone's surface is crossed on the way to the point
         cone = np.float32(np.tan(self.half_angle_rad)) * np.abs(height)
         cone += np.float32(self.skin_radius_m)
         cone *= cone
@@ -123,7 +124,7 @@ class ReceptiveField:
     def _near(
         self, positions_m: np.ndarray, points_m: np.ndarray, gains: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Points that may activate a taxel: by a box around all taxels."""
+        """Points that may activate a taxel, by a box around all taxels."""
         low, high = positions_m.min(axis=0) - self.reach_m, positions_m.max(axis=0) + self.reach_m
         near = (gains > 0) & ((points_m >= low) & (points_m <= high)).all(axis=1)
         return points_m[near], gains[near]
@@ -131,16 +132,16 @@ class ReceptiveField:
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
-    """The most threatened place of one part of the skin.
+    """An obstacle near one part of the skin.
 
     Attributes
     ----------
     part : str
         Name of the part.
     point_m : array, shape (3,)
-        Mean of the concerned taxels' positions, weighted by activation; frame of the part's link.
+        Mean position of the activated taxels, weighted by activation; frame of the part's link.
     normal : array, shape (3,)
-        Mean of their normals, weighted likewise; at most 1 long, less where they differ.
+        Mean of their normals, weighted likewise; of length 1 or, if they differ, less.
     magnitude : float
         The highest activation.
     """
@@ -152,10 +153,10 @@ class Obstacle:
 
 
 def response(distance_m: ArrayLike) -> np.ndarray:
-    """Activation by a point at a distance from the skin, 0 to 1 (its highest).
+    """Activation by a point at a distance from the skin, from 0 to 1.
 
-    Parzen windows over the histogram: every bin's share of touches as a normal curve at the bin's left
-    edge, as wide (standard deviation) as a bin.
+    Parzen windows over the histogram: every bin's fraction of touches as a normal curve at the bin's left
+    edge, with a bin's width as standard deviation.
 
     Parameters
     ----------
@@ -176,7 +177,7 @@ def response(distance_m: ArrayLike) -> np.ndarray:
 
 
 def obstacles(skin: Skin, activations: np.ndarray, threshold: float = ACTIVATION_THRESHOLD) -> list[Obstacle]:
-    """One obstacle for each part that has taxels above the threshold.
+    """One obstacle for each part with taxels above the threshold.
 
     Parameters
     ----------

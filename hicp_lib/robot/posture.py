@@ -1,4 +1,4 @@
-"""Angles of the whole upper body, and those of each chain."""
+"""Joint angles of the whole upper body, and of each chain."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Posture:
     Attributes
     ----------
     torso_rad : array, shape (3,), optional
-        Pitch, roll, yaw; upright when left out.
+        Pitch, roll, yaw; upright by default.
     neck_rad : array, shape (3,), optional
         Pitch, roll, yaw; upright when left out.
     left_rad, right_rad : array, shape (7,), optional
-        Shoulder pitch, roll, yaw, elbow, wrist prosup, pitch, yaw; hanging down when left out.
+        Shoulder pitch, roll, yaw, elbow, wrist prosup, pitch, yaw; hanging down by default.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""The robot's body as thick lines, where its links are, and what of a camera's points is the robot itself.
+"""The robot's body as capsules, its links' poses, and a filter for points on the robot itself.
 
-Ends are origins of links; thicknesses are rough. Its camera sees its arms, and detectors find
-people in them. What the robot looks like: `hicp_lib.robot.shape`.
+Ends are origins of links; radii are approximate. The robot's camera sees its arms, and detectors find people
+in them. The robot's appearance is in `hicp_lib.robot.shape`.
 """
 
 from typing import NamedTuple
@@ -75,7 +75,7 @@ def link_poses(icub: ICub, posture: Posture, mount: str = "tilted") -> dict[str,
     Returns
     -------
     dict of str to array, shape (4, 4)
-        By chain and link, such as "left forearm"; "root" and "camera" are their own.
+        By chain and link, such as "left forearm"; also "root" and "camera".
     """
     poses = {"root": np.eye(4), "camera": icub.T_root_camera(posture.angles("head"), mount)}
     for chain in ("head", "left", "right"):
@@ -85,7 +85,7 @@ def link_poses(icub: ICub, posture: Posture, mount: str = "tilted") -> dict[str,
 
 
 MARGIN_M = 0.02
-"""How far from the robot's surface a point still counts as on it: errors of depth and of the calibration."""
+"""Distance from the robot's surface up to which points count as on it, to allow for depth errors."""
 
 
 def self_distance_m(icub: ICub, posture: Posture, points_m: np.ndarray) -> np.ndarray:
@@ -120,7 +120,7 @@ def self_distance_m(icub: ICub, posture: Posture, points_m: np.ndarray) -> np.nd
 
 
 def filter_self(icub: ICub, posture: Posture, points_m: np.ndarray, margin_m: float = MARGIN_M) -> np.ndarray:
-    """The points that are not the robot's own body.
+    """Remove points on the robot's own body.
 
     Parameters
     ----------
@@ -129,12 +129,12 @@ def filter_self(icub: ICub, posture: Posture, points_m: np.ndarray, margin_m: fl
     points_m : array, shape (..., 3)
         In the root frame.
     margin_m : float, optional
-        What is nearer to the body is taken for it.
+        Points closer to the body than this are removed.
 
     Returns
     -------
     array, shape (..., 3)
-        NaN for those that are.
+        NaN for removed points.
     """
     is_self = self_distance_m(icub, posture, points_m) < margin_m
     return np.where(is_self[..., None], np.nan, points_m)

@@ -1,10 +1,10 @@
-"""Separation as ISO 10218-2:2025 asks for it: how far off a person must be for a robot to stop in time.
+"""Protective separation distance of ISO 10218-2:2025: how far a person must be for a robot to stop in time.
 
-`S = S_h + S_r + S_s + C + Z_d + Z_r`: what the person covers until the robot stands, what the robot covers
-while it reacts and while it stops, how far a body reaches before it is noticed, and how uncertain the places
-of both are. The 2025 edition took this over from ISO/TS 15066:2016. Its text was not at hand: terms are as
-Marvel and Norcross (2017) describe those of the specification; whether the edition changes them is unsure.
-A yardstick: nothing in this project is a safety function.
+`S = S_h + S_r + S_s + C + Z_d + Z_r`: the person's travel until the robot stands still, the robot's travel
+while it reacts and while it stops, the reach of a body before it is noticed, and the uncertainty of both
+positions. The 2025 edition took this over from ISO/TS 15066:2016. Its text was not available: terms follow
+the description of the specification by Marvel and Norcross (2017), and the new edition may have changed them.
+It serves for comparison only: nothing in this project is a safety function.
 """
 
 from collections.abc import Mapping
@@ -16,25 +16,25 @@ import pandas as pd
 from hicp_lib.core.errors import InputError
 
 HUMAN_SPEED_M_S = 1.6
-"""How fast a person is taken to be when nobody measures it."""
+"""Assumed speed of a person when it is not measured."""
 
 
 @dataclass(frozen=True)
 class Brakes:
-    """How the arm stops: the command takes its time, then joints decelerate evenly.
+    """How the arm stops: after a delay, joints decelerate uniformly.
 
     Attributes
     ----------
     delay_s : float
-        From the command until joints begin to slow down. Assumed: one control period.
+        From the command until joints start to slow down. Assumed: one control period.
     deceleration_rad_s2 : float
-        Of the joint that takes longest. Assumed (100 degrees per second squared): none is published for the
-        iCub; it stops joints at the controller's 30 degrees per second within 0.3 s.
+        Of the joint that takes longest. Assumed (100 degrees per second squared), as no value is published
+        for the iCub; it stops joints at the controller's 30 degrees per second within 0.3 s.
 
     Raises
     ------
     InputError
-        If they are no such numbers.
+        If they are not such numbers.
 
     Examples
     --------
@@ -50,7 +50,7 @@ class Brakes:
             raise InputError(f"{self} never stop an arm; expected seconds, 0 or more, and rad/s^2, above 0")
 
     def stopping_s(self, joint_rad_s: float) -> float:
-        """From the command to standstill, T_s, when the fastest joint turns this fast."""
+        """Time from the command to standstill, T_s, for this speed of the fastest joint."""
         return float(self.delay_s + joint_rad_s / self.deceleration_rad_s2)
 
 
@@ -66,11 +66,11 @@ class Separation:
     human_m_s, robot_m_s : float
         Speeds towards each other.
     reaction_s : float
-        T_r, from what happens to the robot's reaction.
+        T_r, from an event to the robot's reaction.
     stopping_s : float
         T_s, from there to standstill.
     brake_delay_s : float
-        Of this, what passes before the robot slows down.
+        The part of it before the robot slows down.
     intrusion_m : float
         C.
     human_uncertainty_m, robot_uncertainty_m : float
@@ -97,7 +97,7 @@ class Separation:
         Returns
         -------
         dict of str to float
-            By what they stand for.
+            By their meaning.
         """
         slowing_s = self.stopping_s - self.brake_delay_s
         return {
@@ -105,13 +105,13 @@ class Separation:
             "S_r: robot, while it reacts": self.robot_m_s * self.reaction_s,
             "S_s: robot, while it stops": self.robot_m_s * (self.brake_delay_s + slowing_s / 2),
             "C: body beyond the keypoints": self.intrusion_m,
-            "Z_d: uncertainty of the person's place": self.human_uncertainty_m,
-            "Z_r: uncertainty of the robot's place": self.robot_uncertainty_m,
+            "Z_d: uncertainty of the person's position": self.human_uncertainty_m,
+            "Z_r: uncertainty of the robot's position": self.robot_uncertainty_m,
         }
 
     @property
     def distance_m(self) -> float:
-        """The sum: nearer than this the robot would have to be stopping already."""
+        """The sum: below this distance the robot must already be stopping."""
         return sum(self.terms_m().values())
 
 

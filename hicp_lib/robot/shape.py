@@ -1,4 +1,4 @@
-"""What the robot looks like: covers, joints, hands with fingers, face, camera: triangles on its links."""
+"""The robot's appearance as triangles on its links: covers, joints, hands with fingers, face, camera."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +12,7 @@ from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.segments import link_poses
 
 SHAPE_FILE = DATA_DIR / "icub_shape.npz"
-STEP_M = 2e-5  # vertices are stored as whole multiples of this
+STEP_M = 2e-5  # vertices are stored as integer multiples of this
 _STORED = {"links": (-1,), "vertices_20um": (-1, 3), "vertex_link": (-1,), "triangles": (-1, 3)}
 _STORED |= {"vertex_colour": (-1,), "colours": (-1, 3)}
 _UNSEEN = ("head head", "head neck_roll", "camera", "root")
@@ -31,7 +31,7 @@ class Shape:
     colours : array, shape (n, 3), dtype float32
         Linear RGB of every vertex.
     unseen : array of bool, shape (n_triangles,)
-        What the camera on the head does not see: that, neck, head, pelvis and legs.
+        Invisible to the camera on the head: the camera itself, neck, head, pelvis and legs.
     """
 
     vertices_m: np.ndarray

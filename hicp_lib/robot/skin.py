@@ -1,8 +1,8 @@
-"""The robot's sensitive skin: where its taxels are, and which way they face.
+"""The robot's tactile skin: positions and normals of its taxels.
 
-Palms and forearms are at the positions the robot's own software has for them. For the upper arms and the
-front of the torso only their number is documented: they are placed on simple cylinders, an assumption
-(data/icub_skin.json says which, data/README.md names the sources).
+Taxels of palms and forearms have the positions of the robot's own software. For the upper arms and the front
+of the torso only their number is documented; they are placed on simple cylinders, which is an assumption
+(data/icub_skin.json has the cylinders, data/README.md the sources).
 """
 
 from dataclasses import dataclass
@@ -116,7 +116,7 @@ def _taxels(part: str, parts: dict[str, Any]) -> np.ndarray:
 def _mirrored(
     parts: dict[str, Any], part: str, position_factors: list, normal_factors: list, shift_mm: list
 ) -> np.ndarray:
-    """The taxels of another part in a frame that is turned, and moved a little, against that part's."""
+    """The taxels of another part in a frame that is rotated and slightly shifted relative to that part's."""
     return _taxels(part, parts) * [*position_factors, *normal_factors] + [*shift_mm, 0, 0, 0]
 
 

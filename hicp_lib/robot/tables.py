@@ -1,7 +1,7 @@
-"""Reads data/icub.json: Denavit-Hartenberg tables, joint limits, cables, camera holders, parts.
+"""Read data/icub.json: Denavit-Hartenberg tables, joint limits, cables, camera holders, parts.
 
-Distal convention, as iKin and the robot's documentation have it: a row turns by `theta + offset` about
-z, moves `d` along z and `a` along x, and turns by `alpha` about x. data/README.md names the sources.
+Distal convention, as iKin and the robot's documentation have it: a row rotates by `theta + offset` about z,
+translates by `d` along z and `a` along x, and rotates by `alpha` about x. data/README.md names the sources.
 """
 
 from collections.abc import Callable
@@ -19,11 +19,11 @@ from hicp_lib.core.memo import memoised
 ICUB_FILE = DATA_DIR / "icub.json"
 COLUMNS = ["joint", "link", "a_m", "d_m", "alpha_deg", "offset_deg"]
 Read = TypeVar("Read")
-_MAX_SKEW = 1e-4  # by which a rotation may differ from the nearest one: numbers are rounded
+_MAX_SKEW = 1e-4  # tolerance of a rotation matrix, since numbers are rounded
 
 
 Row = tuple[str | None, str, float, float, float, float]
-"""One row of a Denavit-Hartenberg table: joint (without one it is held at zero), the frame after the row,
+"""One row of a Denavit-Hartenberg table: joint (none: fixed at zero), the frame after the row,
 a and d (metres), alpha and offset (radians)."""
 
 Cable = tuple[dict[str, float], tuple[float, float]]
@@ -33,7 +33,7 @@ sum in radians, infinite where open."""
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """What data/icub.json says; angles in radians, lengths in metres.
+    """The content of data/icub.json; angles in radians, lengths in metres.
 
     Attributes
     ----------
@@ -92,22 +92,22 @@ def read_tables(path: Path = ICUB_FILE) -> Tables:
 
 
 def read_robot_file(path: Path, what: str, columns: list[str], parse: Callable[[dict], Read]) -> Read:
-    """What a JSON file of this project says of the robot.
+    """Read a JSON file of this project about the robot.
 
     Parameters
     ----------
     path : Path
     what : str
-        What the file holds, for the error's message.
+        What the file contains, for the error message.
     columns : list of str
-        What its key `columns` must say.
+        Required value of its key `columns`.
     parse : callable
-        Makes of its content what is returned; what is wrong there may raise anything but `OSError`.
+        Converts its content to the result; may raise anything but `OSError` for malformed content.
 
     Returns
     -------
     object
-        What `parse` does.
+        The result of `parse`.
 
     Raises
     ------

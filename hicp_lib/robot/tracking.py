@@ -1,8 +1,8 @@
-"""How far each keypoint is believed: scores, time since it was seen, and whether it was seen twice.
+"""Track keypoints over time, and weight each by its score, its age, and whether it was seen twice.
 
-Detectors invent people for one frame, lose real ones for a few, and let single keypoints jump. So a
-keypoint counts from its second sighting near the first on, keeps its last believed position while newer
-ones contradict it, and fades out when it is not seen any more.
+Detectors hallucinate people for one frame, lose real ones for a few, and single keypoints jump. So a keypoint
+is trusted from its second detection near the first one, keeps its last trusted position while newer
+detections contradict it, and decays when it is no longer detected.
 """
 
 from collections import deque
@@ -13,30 +13,30 @@ from scipy.optimize import linear_sum_assignment
 
 from hicp_lib.core.keypoints import N_KEYPOINTS
 
-FARTHEST_M = 20.0  # what is farther from the robot along any axis is no sighting: depth ends at 10 m
+FARTHEST_M = 20.0  # detections farther from the robot along any axis are ignored: depth ends at 10 m
 
 
 @dataclass(frozen=True)
 class Trust:
-    """When a keypoint is believed.
+    """Parameters of trust in keypoints.
 
     Attributes
     ----------
     lowest_score, full_score : float
-        Not believed at or below the first, fully from the second on, linear between (the paper's two
-        thresholds, 0.1 and 0.3).
+        Weight 0 up to the first, 1 from the second on, linear between (the paper's two thresholds, 0.1 and
+        0.3).
     jump_m, speed_m_s : float
-        Two sightings `dt` apart are of the same thing within `jump_m + speed_m_s * dt`.
+        Two detections `dt` apart are the same keypoint if within `jump_m + speed_m_s * dt`.
     confirm_frames : int
-        What appears is believed when it is seen again within so many frames.
+        A new keypoint is trusted when it is detected again within this number of frames.
     memory_s : float
-        What was believed is forgotten after this time: what appears then is new again.
+        A trusted keypoint is dropped after this time; a later detection is new again.
     hold_s : float
-        Fully believed for this long after the last sighting, which covers a detector's delay.
+        Full weight for this time after the last detection, to cover a detector's delay.
     fade_s : float
-        Then falls to 1/e in this time (0.9 per cycle of 20 ms, as in HARMONIOUS, is 0.19 s).
+        Then the weight decays to 1/e in this time (0.9 per cycle of 20 ms, as in HARMONIOUS, is 0.19 s).
     max_people : int
-        Only so many people are followed, the nearest to the robot.
+        Maximum number of tracked people, the nearest to the robot.
     """
 
     lowest_score: float = 0.1
@@ -53,13 +53,13 @@ class Trust:
 _MEMORY = np.dtype(
     [("seen_m", "3f8"), ("seen_s", "f8"), ("believed_m", "3f8"), ("believed_s", "f8"), ("score", "f8")]
 )
-"""Of every person and keypoint: the last sighting, and the last one that was believed with its score."""
+"""For every person and keypoint: the last detection, and the last trusted one with its score."""
 
 
 class KeypointTracker:
-    """Remembers what was seen of every person; one object per stream, in the order of time.
+    """State of all tracked people; one object per stream, updated in the order of time.
 
-    A person is recognised from one frame to the next by the keypoints seen in both.
+    A person is matched from one frame to the next by the keypoints detected in both.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class KeypointTracker:
 
     Examples
     --------
-    What is seen once is not believed, seen twice it is:
+    A keypoint detected once is not trusted, detected twice it is:
 
     >>> tracker = KeypointTracker()
     >>> points_m, scores = np.full((1, 136, 3), np.nan), np.full((1, 136), 0.9)
@@ -85,12 +85,12 @@ class KeypointTracker:
         self._memory = _nothing(0)
 
     def see(self, time_s: float, keypoints_m: np.ndarray, scores: np.ndarray, now_s: float) -> bool:
-        """Take in one frame.
+        """Process one frame.
 
         Parameters
         ----------
         time_s : float
-            When the image was taken; frames from the future, and ones not newer than the last, are left out.
+            Time of the image; frames from the future, and ones not newer than the last, are ignored.
         keypoints_m : array, shape (p, 136, 3)
             In the root frame; NaN where unknown.
         scores : array, shape (p, 136)
@@ -99,7 +99,7 @@ class KeypointTracker:
         Returns
         -------
         bool
-            Whether the frame was taken in.
+            Whether the frame was processed.
         """
         if not self.latest_s < time_s <= now_s:
             return False
@@ -114,7 +114,7 @@ class KeypointTracker:
         return True
 
     def points(self, now_s: float) -> tuple[np.ndarray, np.ndarray]:
-        """What is believed.
+        """The trusted keypoints.
 
         Parameters
         ----------
@@ -123,7 +123,7 @@ class KeypointTracker:
         Returns
         -------
         points_m : array, shape (p, 136, 3)
-            In the root frame, NaN where nothing is believed.
+            In the root frame, NaN where none is trusted.
         weights : array, shape (p, 136)
             0 to 1.
         """
@@ -133,19 +133,19 @@ class KeypointTracker:
         return self._memory["believed_m"], weights * np.exp(-late_s / self.trust.fade_s)
 
     def _nearest(self, points: np.ndarray) -> np.ndarray:
-        """Rows of people of whom anything was seen: the nearest to the robot's root."""
+        """Rows of detected people nearest to the robot's root."""
         distance = np.nanmin(np.linalg.norm(points, axis=2), axis=1, initial=np.inf)
         order = np.argsort(distance, kind="stable")[: self.trust.max_people]
         return order[np.isfinite(distance[order])]
 
     def _forget(self, time_s: float) -> None:
-        """Leave out people not seen for long, and all but the latest if there are too many."""
+        """Drop people not detected for long, and all but the latest if there are too many."""
         last_s = np.maximum(self._memory["seen_s"], self._memory["believed_s"]).max(axis=1, initial=-np.inf)
         latest = np.argsort(-last_s, kind="stable")[: 2 * self.trust.max_people]
         self._memory = self._memory[latest[time_s - last_s[latest] <= self.trust.memory_s]]
 
     def _update(self, time_s: float, points: np.ndarray, scores: np.ndarray) -> None:
-        """Remember the sightings, and believe those near an earlier one of the same person."""
+        """Store the detections, and trust those near an earlier one of the same person."""
         rows, people = self._recognise(points, time_s)
         new = np.delete(np.arange(len(points)), people)
         memory = np.concatenate([self._memory[rows], _nothing(len(new))])
@@ -161,7 +161,7 @@ class KeypointTracker:
         self._memory = np.concatenate([memory, np.delete(self._memory, rows, axis=0)])
 
     def _recognise(self, points: np.ndarray, time_s: float) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of the memory and of people seen, paired so that most keypoints fit."""
+        """Rows of the state and of detected people, paired so that most keypoints match."""
         memory = self._memory[:, None]
         shared = self._near(points[None], time_s, memory["seen_m"], memory["seen_s"]).sum(axis=2)
         rows, people = linear_sum_assignment(-shared)
@@ -171,14 +171,14 @@ class KeypointTracker:
     def _near(
         self, points: np.ndarray, time_s: float, before_m: np.ndarray, before_s: np.ndarray
     ) -> np.ndarray:
-        """Whether sightings are of the same thing as earlier ones; not where either is unknown."""
+        """Whether detections match earlier ones; False where either is unknown."""
         passed_s = time_s - before_s
         allowed_m = self.trust.jump_m + self.trust.speed_m_s * passed_s
         return (np.linalg.norm(points - before_m, axis=-1) <= allowed_m) & (passed_s <= self.trust.memory_s)
 
 
 def _nothing(n: int) -> np.ndarray:
-    """Memory (n, 136) of people never seen."""
+    """State (n, 136) of people never detected."""
     memory = np.zeros((n, N_KEYPOINTS), dtype=_MEMORY)
     memory["seen_m"] = memory["believed_m"] = np.nan
     memory["seen_s"] = memory["believed_s"] = -np.inf

@@ -1,15 +1,15 @@
-"""How fast each joint may turn: joint limits, and obstacles that push joints away.
+"""Velocity bounds of each joint, from joint limits and from obstacles that push joints away.
 
-After the reactive controller of Nguyen et al. (2018) and its published code (robotology/react-control):
-an obstacle does not add a motion, it narrows what the joints may do until they give way. That bounds tighten
-before they push is ours, in the spirit of the authors' later controller (HARMONIOUS, 2023).
+After the reactive controller of Nguyen et al. (2018) and its published code (robotology/react-control): an
+obstacle does not add a motion; it narrows the velocity bounds until the joints move away. Tightening the
+bounds before they push is our addition, similar to the authors' later controller (HARMONIOUS, 2023).
 """
 
 from collections.abc import Iterable
 
 import numpy as np
 
-_STEEPNESS = 10  # of the way from full speed to none, over the guard
+_STEEPNESS = 10  # steepness of the transition from full speed to none, over the guard
 
 
 def guarded_bounds(
@@ -17,7 +17,7 @@ def guarded_bounds(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Velocities that slow down towards the joint limits and never cross them.
 
-    Within `guard` (a part of the joint's range) of a limit the bound towards it is scaled by
+    Within `guard` (a fraction of the joint's range) of a limit the bound towards it is scaled by
     `(1 + tanh(10 (x - 1/2))) / 2`, where x goes from 0 at the limit to 1 at the guard's end. A joint
     outside its limits is brought back, no faster than `fastest_rad_s`.
 
@@ -37,7 +37,7 @@ def guarded_bounds(
 
     Examples
     --------
-    A joint in the middle, and one half way through the guard before its upper limit:
+    A joint in the middle of its range, and one halfway through the guard at its upper limit:
 
     >>> limits_rad = np.array([[-1.0, 1.0], [-1.0, 1.0]])
     >>> lowest, highest = guarded_bounds(np.array([0.0, 0.95]), limits_rad, 0.5, 0.05, 0.02)
@@ -47,7 +47,7 @@ def guarded_bounds(
     width = guard * (limits_rad[:, 1] - limits_rad[:, 0])
     room = np.stack([q_rad - limits_rad[:, 0], limits_rad[:, 1] - q_rad])
     slowed = fastest_rad_s * 0.5 * (1 + np.tanh(_STEEPNESS * (room / width - 0.5)))
-    # Bound by the limit itself: one period at that velocity ends on it.
+    # Bound by the limit itself: one period at that velocity ends at it.
     towards = np.maximum(np.minimum(slowed, room / period_s), -fastest_rad_s)
     return -towards[0], towards[1]
 
@@ -84,20 +84,20 @@ def shape_bounds(
     onset: float,
     neutral: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds that make every joint give way to obstacles, as far as the bounds given allow it.
+    """Bounds that make every joint avoid obstacles, as far as the given bounds allow.
 
-    Obstacles come one after another. One that pushes a joint forward raises its lower bound (and the upper
-    one where that is lower), one that pushes it back lowers the upper bound likewise: to the push times
-    the magnitude above `neutral`. From magnitude `onset` on, joints may turn towards the obstacle the
-    slower the nearer it is, and at `neutral` not at all. In the published form (`neutral` 0, from 0.2 on)
-    the push begins with a step: at that distance the arm trembles between giving way and coming back.
+    Obstacles are applied one after another. One that pushes a joint forward raises its lower bound (and the
+    upper one if that is lower); one that pushes it back lowers the upper bound in the same way: to the push
+    times the magnitude above `neutral`. From magnitude `onset` on, joints may turn towards the obstacle only
+    at decreasing speed, and from `neutral` on not at all. In the published form (`neutral` 0, from 0.2 on)
+    the push starts with a step: at that distance the arm oscillates between retreat and return.
 
     Parameters
     ----------
     lowest, highest : array, shape (n,)
         rad/s, before.
     obstacles : iterable of tuple
-        Of each, the velocities (n,) it pushes with (see `pushes`), and its magnitude.
+        For each, the velocities (n,) of its push (see `pushes`), and its magnitude.
     onset, neutral : float
         Magnitudes.
 

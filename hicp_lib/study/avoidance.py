@@ -1,4 +1,4 @@
-"""What avoidance was worth over people: how near they came, how soon the robot gave way, and why not."""
+"""Evaluation of avoidance over people: clearances, reaction times, and reasons of failures."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -16,11 +16,11 @@ from hicp_lib.robot.home import HOME_M
 from hicp_lib.robot.loop import AVOIDING
 
 MARKS_M = (0.05, 0.10)
-"""Clearances that are asked for."""
+"""Clearances to check."""
 UNTIL = {"in the first reach": "reach_m", "until they leave": "min_distance_m"}
-"""Until when a least distance is: the column of `metrics` that has it."""
+"""Period of a smallest distance: its column of `metrics`."""
 FIELD_M = 0.25
-"""The person is near the robot's skin when nearer than this: about where its receptive fields begin."""
+"""The person is near the robot's skin below this distance, about where its receptive fields start."""
 REACH_M = 0.4  # keypoints this near the post can threaten the hand
 CROSSED_M = 0.2  # reactions count from here
 MOVED_M = 0.005  # the hand has begun to give way
@@ -36,12 +36,12 @@ def metrics(runs: Iterable[Run]) -> pd.DataFrame:
     """One row per run; seconds and metres, NaN for what did not happen.
 
     Columns: `script`, `subject`, `detector`, `gains`, `latency_s`, `reach_m` and `min_distance_m` (see
-    `sweeps.least_distances`), `under_5cm_s`, `under_10cm_s`, `reaction_s` (from the person's coming within
+    `sweeps.least_distances`), `under_5cm_s`, `under_10cm_s`, `reaction_s` (from the person's crossing of
     `CROSSED_M` to the first motion), `retreat_m` (the hand's largest distance from its post),
-    `false_retreats` (begun while the person was farther than `FIELD_M`), `back_s` (from the person's
-    having left to the hand's being back), `seen_share` (of the images taken while the person is near, those
-    with any sure keypoint in space), `head_share` (those with one of the head that is on the head), `blind_s`
-    (longest time the person was near with nothing new seen of them).
+    `false_retreats` (started while the person was farther than `FIELD_M`), `back_s` (from the person's
+    leaving until the hand is back), `seen_share` (share of the images taken while the person is near that
+    have a sure keypoint in space), `head_share` (those with a head keypoint on the head), `blind_s` (longest
+    time the person was near without a new detection).
     """
     return pd.DataFrame([_metrics(run) for run in runs])
 
@@ -62,7 +62,8 @@ def over_people(table: pd.DataFrame, by: Sequence[str], of: str = "min_distance_
     -------
     pd.DataFrame
         Columns `by`; `value, low, high`, the mean and its 95 % interval over people (none from fewer than
-        ten); for each of `MARKS_M` as `kept_5cm` the share of people with as much, `kept_5cm_low`,
+        ten); for each of `MARKS_M`, such as `kept_5cm`, the share of people with at least this clearance,
+        `kept_5cm_low`,
         `kept_5cm_high` (Wilson's 95 % interval); `n_people`.
 
     Examples
@@ -101,14 +102,14 @@ def clearance(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _share(flags: pd.Series) -> tuple[float, float, float]:
-    """How many of flags are set, with Wilson's score interval."""
+    """Share of set flags, with Wilson's score interval."""
     k, n = int(flags.sum()), len(flags)
     centre, half = (k + Z**2 / 2) / (n + Z**2), Z / (n + Z**2) * np.sqrt(k * (n - k) / n + Z**2 / 4)
-    return k / n, max(centre - half, 0.0), min(centre + half, 1.0)  # rounding may leave them
+    return k / n, max(centre - half, 0.0), min(centre + half, 1.0)  # rounding may exceed the limits
 
 
 def reasons(table: pd.DataFrame) -> pd.DataFrame:
-    """Why people came nearer than the first of `MARKS_M` in their first reach.
+    """Reasons why people came nearer than the first of `MARKS_M` in their first reach.
 
     Parameters
     ----------
@@ -127,7 +128,7 @@ def reasons(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def false_retreats(table: pd.DataFrame) -> pd.DataFrame:
-    """Whom the arm moved for, of bystanders.
+    """Bystanders for whom the arm moved.
 
     Parameters
     ----------
@@ -147,14 +148,14 @@ def false_retreats(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def model_check(table: pd.DataFrame, swept: pd.DataFrame, follow_m_s: float) -> pd.DataFrame:
-    """First reaches of rendered people beside those with modelled errors, with our gains.
+    """Compare first reaches of rendered people with those under modelled errors, with our gains.
 
     Parameters
     ----------
     table : pd.DataFrame
         As from `metrics`.
     swept : pd.DataFrame
-        As from `sweeps.sweep`; has the same people, following as fast, at the same latencies.
+        As from `sweeps.sweep`; has the same people, following at the same speed, at the same latencies.
     follow_m_s : float
 
     Returns
@@ -184,7 +185,7 @@ def curves(swept: pd.DataFrame, latencies: Mapping[str, Latency]) -> dict[str, p
 
 
 def sightings(runs: Iterable[Run]) -> pd.DataFrame:
-    """What a detector found of people's keypoints, in the form of `error_model.fit`."""
+    """A detector's errors of people's keypoints, in the form of `error_model.fit`."""
     parts = []
     for number, run in enumerate(runs):
         for image, frame in run.frames.iterrows():
@@ -213,8 +214,8 @@ def sure_keypoints(frame: pd.Series) -> tuple[np.ndarray, np.ndarray, np.ndarray
 def keypoint_errors(runs: Iterable[Run]) -> pd.DataFrame:
     """Error of every sure keypoint that reached the loop: `script`, `detector`, `t_s`, `near`, `error_m`.
 
-    To the person's true keypoint of that name on either side, the nearer one: which of the two hands it is
-    matters to names, not to distances. `near`: perceived within `REACH_M` of the hand's post.
+    To the person's true keypoint of that name on either side, whichever is nearer, since left and right do
+    not matter for distances. `near`: perceived within `REACH_M` of the hand's post.
     """
     parts = []
     for run in runs:
@@ -230,11 +231,11 @@ def keypoint_errors(runs: Iterable[Run]) -> pd.DataFrame:
 
 
 def measured_times(runs: Iterable[Run]) -> pd.DataFrame:
-    """What detector and lifting took per image when the runs were first simulated, beside what is stated.
+    """Measured times of detector and lifting per image, from the first simulation, and the stated ones.
 
     Columns: `detector`, `inference_s` and `latency_s` as stated, `median_ms`, `p99_ms`, `within_share` (of
-    the images, those that took no longer than `inference_s`). The first image of a run is left out: the
-    detector is made ready with it.
+    the images, those that took no longer than `inference_s`). The first image of a run is left out, as it
+    initialises the detector.
     """
     runs, rows = [run for run in runs if len(run.frames)], []
     for detector, latency in {run.job.detector: run.job.latency for run in runs}.items():
@@ -265,7 +266,7 @@ def _metrics(run: Run) -> dict:
 
 
 def _sightings(run: Run, near_s: np.ndarray) -> dict:
-    """How well the person was seen while near, from the images of a run."""
+    """Detection of the person while near, from the images of a run."""
     if not len(run.frames) or not len(near_s):
         return {"seen_share": np.nan, "head_share": np.nan, "blind_s": np.nan}
     frames = run.frames[run.frames["t_s"].between(near_s[0], near_s[-1])]
@@ -282,7 +283,7 @@ def _shows_head(points_m: np.ndarray, is_sure: np.ndarray, truth_m: np.ndarray) 
 
 
 def _crossing_s(t: np.ndarray, distance_m: np.ndarray) -> float:
-    """When the distance falls below `CROSSED_M` for the last time before it is least; NaN: it never does."""
+    """Time when the distance last falls below `CROSSED_M` before its minimum; NaN if never."""
     before = distance_m[: distance_m.argmin() + 1]
     outside = np.flatnonzero(before >= CROSSED_M)
     return float(t[outside[-1]]) if len(outside) and before[-1] < CROSSED_M else np.nan

@@ -1,4 +1,4 @@
-"""The data of the motion capture test: what was detected and lifted, the clock's offset, and errors.
+"""The data of the motion capture test: detections, lifted keypoints, clock offset, and errors.
 
 Each person has a recording of their own, with motion capture, its clock and registration.
 """
@@ -47,7 +47,7 @@ class Person:
     found : dict of str to list of Detections
         By detector, in every frame.
     points, stepwise : pd.DataFrame
-        As from `lift_frames`; the perfect detector is among them where the truth is known.
+        As from `lift_frames`; includes the perfect detector if there is ground truth.
     clock : ClockOffset
     """
 
@@ -62,7 +62,7 @@ class Person:
 def follow_people(
     recordings: Sequence[Recording], detectors: Sequence[str]
 ) -> tuple[list[Person], pd.DataFrame]:
-    """All people whose motion capture can be brought to the camera's clock.
+    """All people whose motion capture can be synchronised with the camera.
 
     Parameters
     ----------
@@ -75,8 +75,8 @@ def follow_people(
     list of Person
     pd.DataFrame
         A row for each recording: columns `person` (from 0 on), `n_frames, offset_s, first_half_s,
-        second_half_s, correlation` (as of `ClockOffset`), `off_s` (less the true offset), NaN where they are
-        not known; `left_out` (why the person is, else "").
+        second_half_s, correlation` (as of `ClockOffset`), `off_s` (difference from the true offset), NaN if
+        unknown; `left_out` (why the person is, else "").
 
     Raises
     ------
@@ -117,7 +117,7 @@ def open_mocap(recording: Recording) -> MotionCapture:
 
 
 def detect_frames(recording: Recording, detectors: Sequence[str]) -> dict[str, list[Detections]]:
-    """What detectors find in every frame; kept on disk.
+    """Detections in every frame; cached on disk.
 
     Parameters
     ----------
@@ -134,10 +134,11 @@ def detect_frames(recording: Recording, detectors: Sequence[str]) -> dict[str, l
 
 
 def perfect_detections(recording: Recording) -> dict[str, list[Detections]]:
-    """The body's true keypoints in every frame, hidden ones too, with scores of 1.
+    """The body's true keypoints in every frame, including occluded ones, with scores of 1.
 
-    Markers lie on the skin, joints below it, and depth sees the skin: the floor that detectors are compared
-    with is some centimetres. It is no bound: errors that lean towards the skin may bring a detector below.
+    Markers are on the skin, joints below it, and depth cameras see the skin: so the floor for detectors is
+    some centimetres. It is not a lower bound: a detector whose errors lean towards the skin may fall below
+    it.
 
     Parameters
     ----------
@@ -146,7 +147,7 @@ def perfect_detections(recording: Recording) -> dict[str, list[Detections]]:
     Returns
     -------
     dict of str to list of Detections
-        Under `PERFECT`, in the order of the frames; empty where the truth is not known.
+        Under `PERFECT`, in the order of the frames; empty without ground truth.
     """
     truth = read_truth(recording)
     return {} if truth is None else {PERFECT: true_detections(truth, len(recording), BODY)}
@@ -155,7 +156,7 @@ def perfect_detections(recording: Recording) -> dict[str, list[Detections]]:
 def lift_frames(
     recording: Recording, found: Mapping[str, Sequence[Detections]]
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Everyone's keypoints in space; kept on disk.
+    """Lifted keypoints of all people; cached on disk.
 
     Parameters
     ----------
@@ -168,7 +169,7 @@ def lift_frames(
     pd.DataFrame
         Columns as of `hicp_lib.lifting.table.lift_found`, by each of `METHODS`.
     pd.DataFrame
-        The first detector's, also by every step between the methods where true positions are known (for
+        The first detector's, for every step between the methods, if true positions are known (for
         `ablation`).
     """
     n_steps = METHODS if read_truth(recording) is None else METHODS | N_STEPS
@@ -177,14 +178,14 @@ def lift_frames(
 
 
 def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame) -> ClockOffset:
-    """What to add to the motion capture's stamps, from how fast elbows and wrists move.
+    """The clock offset of motion capture, from the speeds of elbows and wrists.
 
     Parameters
     ----------
     recording : Recording
     mocap : MotionCapture
     points : pd.DataFrame
-        The first of `lift_frames`; those of all detectors and methods are compared at once.
+        The first of `lift_frames`; all detectors and methods are used jointly.
 
     Returns
     -------
@@ -193,12 +194,12 @@ def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame)
     Raises
     ------
     InputError
-        If nothing moves together (`hicp_lib.mocap.synchronisation.clock_offset`).
+        If no movements match (`hicp_lib.mocap.synchronisation.clock_offset`).
     """
     best = points[points["person"] == 0]
     cases = [rows for _, rows in best.groupby(["detector", "method"], sort=False)]
     seen_m = [position_array(rows, mocap_error.TABLE_JOINTS, len(recording)) for rows in cases]
-    # Speeds are the same in any frame: no registration is needed yet.
+    # Speeds do not depend on the frame, so no registration is needed yet.
     means = mocap_error.marker_means(mocap, mocap.times_s, np.eye(4), mocap_error.TABLE_JOINTS)
     means_m = means[POSITION].to_numpy(float).reshape(len(mocap.times_s), len(mocap_error.TABLE_JOINTS), 3)
     tiled_m = np.tile(means_m, (1, len(cases), 1))
@@ -208,7 +209,7 @@ def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame)
 def medians_under(
     registered: Sequence[Registered], points: Sequence[pd.DataFrame], draws: Draws = Draws()
 ) -> pd.DataFrame:
-    """What the choice of the registration does to the median errors of elbows and wrists.
+    """Effect of the registration on the median errors of elbows and wrists.
 
     Parameters
     ----------
@@ -222,8 +223,8 @@ def medians_under(
     Returns
     -------
     pd.DataFrame
-        Column `registration`, then as from `median_errors`, score above 0.1; the exact transform, where it is
-        known, comes last.
+        Column `registration`, then as from `median_errors`, score above 0.1; the exact transform, if known,
+        comes last.
     """
     errors: dict[str, list[tuple[pd.DataFrame, int]]] = {}
     for one, lifted in zip(registered, points, strict=True):
@@ -261,9 +262,9 @@ def errors_at_joints(registered: Sequence[Registered], points: Sequence[pd.DataF
 
 
 def ablation(people: Sequence[Person]) -> tuple[pd.DataFrame, pd.DataFrame] | None:
-    """Each step of lifting on all people's `stepwise`, and how often depths lie within their sigma.
+    """Each step of lifting on all people's `stepwise`, and how often depths are within their sigma.
 
-    None where true positions are not known.
+    None if true positions are unknown.
     """
     known = [(one, truth) for one in people if (truth := read_truth(one.recording)) is not None]
     errors = [lifting_errors(one.stepwise, truth, one.recording.T_base_cam) for one, truth in known]

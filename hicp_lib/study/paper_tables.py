@@ -1,4 +1,4 @@
-"""The paper's tables: its survey (I: `data/survey.json`, II: the registry), and III and IV beside ours."""
+"""The paper's tables: its survey (I: `data/survey.json`, II: the registry); III and IV with our results."""
 
 from collections.abc import Collection
 
@@ -31,7 +31,8 @@ def surveyed_detectors(run: Collection[str]) -> pd.DataFrame:
     -------
     pd.DataFrame
         Columns `system, detector, paradigm, keypoints, training data, tracking, input`, `parameters [M]`,
-        `operations [G]` (NaN where the user's weights decide) and `here`: "run", or what would run it.
+        `operations [G]` (NaN where the user's weights decide) and `here`: "run", or the command that would
+        run it.
 
     Examples
     --------
@@ -71,14 +72,14 @@ def paper_medians() -> pd.DataFrame:
 
 
 def beside_paper(medians: pd.DataFrame, paper: pd.DataFrame, min_score: float) -> pd.DataFrame:
-    """One of the paper's two tables, what was measured here above the paper's own rows.
+    """One of the paper's two tables: our rows above those of the paper.
 
     Parameters
     ----------
     medians, paper : pd.DataFrame
         As from `median_errors` and `paper_medians`.
     min_score : float
-        Whose table: one of `MIN_SCORES`.
+        Selects the table: one of `MIN_SCORES`.
 
     Returns
     -------
@@ -95,7 +96,7 @@ def beside_paper(medians: pd.DataFrame, paper: pd.DataFrame, min_score: float) -
 def above_floor(
     medians: pd.DataFrame, differences: pd.DataFrame, paper: pd.DataFrame, min_score: float
 ) -> pd.DataFrame:
-    """What stands above the perfect detector's medians, here and in the paper, by the paper's lifting.
+    """Medians above those of the perfect detector (the floor), here and in the paper, by the paper's lifting.
 
     Parameters
     ----------

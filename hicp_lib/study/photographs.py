@@ -1,4 +1,4 @@
-"""Photographs beside rendered people: figures that `tools/photographs.py` made, and how far they agree."""
+"""Compare photographs with rendered people: results of `tools/photographs.py`, and their agreement."""
 
 from collections.abc import Mapping
 
@@ -21,7 +21,7 @@ def photographs(table: str) -> pd.DataFrame:
 
 
 def rank_agreement(drawn: Drawn) -> pd.DataFrame:
-    """How alike bodies' AP orders the detectors on photographs and in a run: Kendall's rank correlation.
+    """Kendall's rank correlation of detectors by AP of bodies, between photographs and a run.
 
     Parameters
     ----------
@@ -31,8 +31,8 @@ def rank_agreement(drawn: Drawn) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns `subset, n_detectors, tau, low, high`; the interval is over draws of photographs and of the
-        run's images at the same time.
+        Columns `subset, n_detectors, tau, low, high`; the interval is over joint resamples of photographs and
+        of the run's images.
     """
     from scipy.stats import kendalltau
 
@@ -52,7 +52,7 @@ def rank_agreement(drawn: Drawn) -> pd.DataFrame:
 
 
 def beside(table: pd.DataFrame) -> pd.DataFrame:
-    """AP of bodies in a run and on photographs, of the detectors that both have.
+    """AP of bodies in a run and on photographs, for the detectors in both.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def who_is_there(truth: Mapping[str, Annotations]) -> pd.DataFrame:
 
 
 def people_table(truth: Mapping[str, Annotations]) -> pd.DataFrame:
-    """Everybody in the crops: size of the box, labels of COCO's 17 points, others reaching in.
+    """All people in the crops: size of the box, labels of COCO's 17 points, other people in the crop.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""What a result was made with: code, data, environment, machine.
+"""Provenance of a result: code, data, environment, machine.
 
-Printed below a page (`hicp_lib.study.page`): the library and the data as a whole. Whether the page is still
-fresh (`hicp_lib.report.runs`) follows from the part of them that it uses.
+It is printed below a page (`hicp_lib.study.page`), for the library and the data as a whole. Whether the page
+is still fresh (`hicp_lib.report.runs`) depends on the parts of them that it uses.
 """
 
 import importlib.metadata
@@ -27,7 +27,7 @@ from hicp_lib.detectors.weights.user import user_weights_sha256
 LOCK_PATH = (CHECKOUT or LIBRARY_DIR) / "environment.lock"
 
 _SHOWN_VERSIONS = "numpy pandas opencv-python-headless onnxruntime mediapipe open3d-cpu open3d matplotlib"
-# No program of a checkout's configuration is run.
+# Do not run programs from a checkout's configuration.
 _GIT = ("git", "--no-optional-locks", "-c", "core.fsmonitor=false", "-c", "core.hooksPath=/dev/null")
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
@@ -40,7 +40,7 @@ def library_sha256() -> str:
 def data_sha256() -> str:
     """SHA-256 of every file under `data/`, the detector registry with the weights' hashes among them.
 
-    Not of the reference runs: they follow from the rest.
+    Without the reference runs, which depend on the rest.
     """
     files = files_below(DATA_DIR)
     return files_sha256((path for path in files if REFERENCE_DIR not in path.parents), DATA_DIR)
@@ -52,7 +52,7 @@ def lock_sha256() -> str:
 
 
 def installed_sha256() -> str:
-    """SHA-256 of what is installed, whatever the lock says: distributions, Python, the kind of machine."""
+    """SHA-256 of the actual installation: distributions, Python, type of machine."""
     distributions = {d.name: d.version for d in importlib.metadata.distributions()}
     return digest([distributions, sys.version, platform.machine(), platform.system()])
 
@@ -60,7 +60,7 @@ def installed_sha256() -> str:
 def git_state() -> dict[str, Any]:
     """Commit of the library's checkout, and how many files differ; "unknown" without git or a checkout.
 
-    An installed library may lie within somebody else's repository, whose commit says nothing of it.
+    An installed library may be inside another repository, whose commit is irrelevant.
     """
     status = git("status", "--porcelain")
     changed_files = None if status is None else len(status.splitlines())
@@ -68,7 +68,7 @@ def git_state() -> dict[str, Any]:
 
 
 def git(*arguments: str) -> str | None:
-    """What git says in the library's checkout; None without git or a checkout, or where it refuses."""
+    """Git's output in the library's checkout; None without git or a checkout, or on errors."""
     if CHECKOUT is None:
         return None
     where = child_environment(GIT_DIR=str(CHECKOUT / ".git"), GIT_WORK_TREE=str(CHECKOUT))
@@ -80,7 +80,7 @@ def git(*arguments: str) -> str | None:
 
 
 def versions() -> dict[str, str]:
-    """Python's version and those of the libraries that can move a number."""
+    """Versions of Python and of the libraries that can change a number."""
     installed = {d.name.lower(): d.version for d in importlib.metadata.distributions()}
     shown = {name: installed[name] for name in _SHOWN_VERSIONS.split() if name in installed}
     return {"python": platform.python_version()} | shown
@@ -89,7 +89,7 @@ def versions() -> dict[str, str]:
 def weights_sha256() -> dict[str, str]:
     """SHA-256 of each weight file by name, from the registry; a detector loads no file that differs.
 
-    Further ones are of what the user named for detectors, by these.
+    Also of files that the user registered, by detector.
     """
     weights = read_json(DATA_DIR / "detectors.json")["weights"]
     return {name: row["sha256"] for name, row in weights.items()} | user_weights_sha256()
@@ -111,8 +111,8 @@ def _cpu_model() -> str:
 
 
 def peak_memory_mb() -> int:
-    """Most memory this process ever held, without other processes it started."""
-    unit = 1 if sys.platform == "darwin" else 1024  # bytes there, kibibytes elsewhere
+    """Peak memory of this process, without child processes."""
+    unit = 1 if sys.platform == "darwin" else 1024  # bytes on this system, kibibytes elsewhere
     return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6)
 
 
@@ -123,7 +123,7 @@ def onnx_providers() -> list[str]:
 
 
 def provenance(parameters: dict[str, Any]) -> dict[str, Any]:
-    """Everything a reader needs to judge or repeat a result made now, in this process, with `parameters`.
+    """Everything needed to assess or repeat a result made now, in this process, with `parameters`.
 
     Examples
     --------
@@ -145,7 +145,7 @@ def provenance(parameters: dict[str, Any]) -> dict[str, Any]:
 
 
 def provenance_html(stamp: dict[str, Any]) -> str:
-    """The footer of a page: what the notebook ran with, folded away until asked for."""
+    """The footer of a page: what the notebook ran with, in a collapsed block."""
     git = stamp["git"]
     changed = {None: "", 0: ""}.get(git["changed_files"], f" with {git['changed_files']} changed files")
     parameters = {k: f"= {json.dumps(v, ensure_ascii=False)}" for k, v in stamp["parameters"].items()}

@@ -1,9 +1,9 @@
-"""The registration of the motion capture test, and readings of the paper's.
+"""The registration of the motion capture test, and interpretations of the paper's.
 
-A simulated recording knows its exact transform; clicks are simulated there. A laboratory's own holds
-`clicks.csv` (markers clicked in images, see `hicp_lib.mocap.clicking`), or `registration.json` when the
-transform is known from elsewhere. The paper clicks eight markers in two images (section IV-C). Which ones,
-and how rotation and translation were put together, it leaves open.
+A simulated recording has the exact transform; clicks are simulated for it. A laboratory's own recording
+contains `clicks.csv` (markers clicked in images, see `hicp_lib.mocap.clicking`), or `registration.json` if
+the transform is known. The paper clicks eight markers in two images (section IV-C). It leaves open which
+ones, and how rotation and translation were combined.
 """
 
 from collections.abc import Sequence
@@ -41,11 +41,11 @@ class Registered:
     offset_s : float
         To add to the motion capture's stamps to have them on the camera's clock.
     fits : list of r.Registration
-        By eight clicks, by all, then by reprojection: the one to use.
+        By eight clicks, by all, then by reprojection, which is the one to use.
     exact : array or None, shape (4, 4)
-        The true transform T_base_mocap; None where it is not known.
+        The true transform T_base_mocap; None if unknown.
     clicks : pd.DataFrame
-        The clicks of the images the paper's registration rests on; empty where the transform was given.
+        The clicks of the images of the paper's registration; empty if the transform was given.
     """
 
     recording: Recording
@@ -56,7 +56,7 @@ class Registered:
     clicks: pd.DataFrame
 
     def reference(self, fit: r.Registration | None = None, joints: Sequence[str] = JOINTS) -> pd.DataFrame:
-        """`marker_means` at the camera's stamps, under one of the fits; the one to use when left out."""
+        """`marker_means` at the camera's times, under one of the fits; by default the one to use."""
         T_base_mocap = (fit or self.fits[-1]).T_base_mocap
         return marker_means(self.mocap, self.recording.times_s - self.offset_s, T_base_mocap, joints)
 
@@ -69,7 +69,7 @@ def register(
     noise_px: float = 1.0,
     seed: int = 0,
 ) -> Registered:
-    """Every registration a recording allows; of one cut short, clicks beyond its end are not used.
+    """All possible registrations of a recording; clicks beyond the end of a shortened one are not used.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def register(
     offset_s : float
         Of the motion capture's clock, as from `find_clock`.
     n_images : int
-        Images with simulated clicks; like the two below, not used on a laboratory's own recording.
+        Images with simulated clicks; like the next two, not used for a laboratory's own recording.
     noise_px : float
         Standard deviation of a simulated click in each direction.
     seed : int
@@ -153,7 +153,7 @@ def _given(recording: Recording) -> r.Registration:
 def registration_readings(
     people: Sequence[Registered], n_images: int = 12, noise_px: float = 1.0, n_draws: int = 100, seed: int = 0
 ) -> pd.DataFrame | None:
-    """Error of `hicp_lib.mocap.eight_clicks.register_by_camera_marker` under each reading of the paper.
+    """Error of `hicp_lib.mocap.eight_clicks.register_by_camera_marker` for each interpretation of the paper.
 
     Parameters
     ----------
@@ -163,8 +163,8 @@ def registration_readings(
     noise_px : float
         Of the simulated clicks, as of `register`.
     n_draws : int
-        How often, of each person, two of the images and eight markers clicked in them are drawn; the same for
-        every reading.
+        Number of random selections, per person, of two images and eight markers clicked in them; the same for
+        every interpretation.
     seed : int
         Of clicks and draws.
 
@@ -173,7 +173,7 @@ def registration_readings(
     pd.DataFrame or None
         Columns `reading, turned_rad` (median angle to the true rotation), `added_m, low_m, high_m` (median
         displacement of the person's markers: median and 95 % range over people and draws), `n_people,
-        n_draws`; None where no recording is simulated.
+        n_draws`; None if no recording is simulated.
 
     Raises
     ------
@@ -223,7 +223,7 @@ def _drawn_readings(
 
 
 def _in_common(tables: list[pd.DataFrame]) -> list[pd.DataFrame]:
-    """The clicks that all tables have with a depth of the person, in one order."""
+    """The clicks that have a depth of the person in all tables, in one order."""
     common = tables[0][_CLICK]
     for table in tables:
         common = common.merge(table.loc[r.keeps_distances(table), _CLICK])
@@ -231,7 +231,7 @@ def _in_common(tables: list[pd.DataFrame]) -> list[pd.DataFrame]:
 
 
 def _draw_eights(frames: np.ndarray, n_draws: int, seed: int) -> list[np.ndarray]:
-    """Rows of eight clicks in two images, for each draw; of fewer, where no two images have so many."""
+    """Rows of eight clicks in two images, for each draw; fewer, if no two images have enough."""
     in_two = [np.flatnonzero(np.isin(frames, two)) for two in combinations(np.unique(frames), 2)]
     n = min(eight_clicks.N_MARKERS, max(map(len, in_two)))
     enough, rng = [rows for rows in in_two if len(rows) >= n], np.random.default_rng(seed)

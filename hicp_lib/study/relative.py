@@ -1,7 +1,7 @@
 """The data of the relative 3D test: recordings of people who sit still, detected and lifted, view by view.
 
 A *view* is one recording of each person: "upper" and "lower" when simulated, as the paper's two holders of
-the camera; a lab's own are called after the folder of the first person. Frames of a view are numbered on from
+the camera; a lab's own are named after the folder of the first person. Frame numbers of a view continue from
 person to person.
 """
 
@@ -34,7 +34,7 @@ def open_views(
     n_people: int = 12,
     seed: int = 0,
 ) -> dict[str, list[Recording]]:
-    """The recordings given by their views, or two simulated ones of each person where none is.
+    """The given recordings by view, or two simulated ones of each person if none is given.
 
     Parameters
     ----------
@@ -66,12 +66,12 @@ def open_views(
 
 
 def subjects_of(views: Views) -> dict[str, np.ndarray]:
-    """Whose each image of a view is, shape (n_frames,)."""
+    """The subject of each image of a view, shape (n_frames,)."""
     return {view: np.repeat(np.arange(len(people)), [*map(len, people)]) for view, people in views.items()}
 
 
 def of_person(views: Views, found: Found, number: int) -> tuple[dict[str, Recording], dict]:
-    """One person's recordings by view, and what was found in them by view and detector.
+    """One person's recordings by view, and the detections in them by view and detector.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def of_person(views: Views, found: Found, number: int) -> tuple[dict[str, Record
     Raises
     ------
     InputError
-        If there are not so many people.
+        If there is no such person.
     """
     n_people = min(map(len, views.values()))
     if not 0 <= number < n_people:
@@ -99,7 +99,7 @@ def of_person(views: Views, found: Found, number: int) -> tuple[dict[str, Record
 
 
 def detect_views(views: Views, detectors: Sequence[str]) -> dict[tuple[str, str], list[list[Detections]]]:
-    """What detectors find in every frame of everybody in every view; kept on disk.
+    """Detections in every frame of every person in every view; cached on disk.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def detect_views(views: Views, detectors: Sequence[str]) -> dict[tuple[str, str]
 
 
 def lift_views(views: Views, found: Found) -> pd.DataFrame:
-    """Everything lifted by every method.
+    """Lift all detections by every method.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def true_positions(views: Views) -> dict[str, pd.DataFrame] | None:
 
 
 def parts_in_image(views: Views, truth: Mapping[str, pd.DataFrame], parts: Parts = PARTS) -> pd.DataFrame:
-    """In what share of a view's images parts of the body are, in the field of view if perhaps hidden.
+    """Share of a view's images with parts of the body in the field of view, even if occluded.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def parts_in_image(views: Views, truth: Mapping[str, pd.DataFrame], parts: Parts
 
 
 def robot_body(views: Mapping[str, Recording]) -> Shape | None:
-    """The robot in the first view's first frame (base frame); None where joints are not known."""
+    """The robot in the first view's first frame (base frame); None if joints are unknown."""
     recording = next(iter(views.values()))
     joints, columns = read_joints(recording), [f"{name}_rad" for name in HEAD_JOINTS]
     if joints is None or not set(columns) <= set(joints):

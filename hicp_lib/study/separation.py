@@ -1,4 +1,4 @@
-"""The separation that ISO 10218-2:2025 would ask for before each detector, from its runs of avoidance."""
+"""The separation required by ISO 10218-2:2025 for each detector, from its runs of avoidance."""
 
 from collections.abc import Sequence
 
@@ -26,10 +26,10 @@ def separations_before(
     brakes: Brakes = ASSUMED,
     robot_uncertainty_m: float = 0.01,
 ) -> dict[str, Separation]:
-    """The separation each detector would need; a detector that gave no keypoint near the hand has none.
+    """The separation that each detector would need; none for a detector without keypoints near the hand.
 
     Speeds of the hand and of the fastest joint are the highest in any of the runs. It takes a latency and a
-    control period to react; then `brakes` stop the arm. The uncertainty of the person's place is the 95th
+    control period to react; then `brakes` stop the arm. The uncertainty of the person's position is the 95th
     percentile of the detector's errors near the hand, the intrusion `beyond_keypoints_m`.
 
     Parameters
@@ -67,11 +67,10 @@ def separations_before(
 
 
 def beyond_keypoints_m(found: np.ndarray) -> float:
-    """How far the skin of hands or head, which come nearest, reaches beyond the nearest of their keypoints.
+    """Distance of the skin of hands or head, which come nearest, beyond the nearest of their keypoints.
 
-    Our reading of the standard's intrusion distance for keypoints; over the adults of the body model that
-    everything is tuned on. Hands or a head of which no keypoint is found have no part in it: nothing warns of
-    them.
+    Our interpretation of the standard's intrusion distance for keypoints, over the development identities.
+    Hands or a head without any detected keypoint are not included: nothing warns of them.
 
     Parameters
     ----------
@@ -106,7 +105,7 @@ def _development_people() -> list[PosedBody]:
 
 
 def _found(runs: Sequence[Run], detector: str) -> np.ndarray:
-    """Which keypoints a detector has ever been sure of, (136,)."""
+    """Which keypoints a detector has ever given with a sufficient score, (136,)."""
     frames = (frame for run in runs if run.job.detector == detector for _, frame in run.frames.iterrows())
     sure = (sure_keypoints(frame)[1].any(axis=0) for frame in frames)
     return np.any([np.zeros(N_KEYPOINTS, bool), *sure], axis=0)

@@ -1,4 +1,4 @@
-"""Where the study's people come from: rendered scenes, or COCO images with Halpe annotations."""
+"""Sources of people: rendered scenes, or COCO images with Halpe annotations."""
 
 import sys
 from dataclasses import dataclass
@@ -24,13 +24,13 @@ class Source:
     kind : str
         "rendered" or "halpe".
     note : str
-        What the people are, in the words of captions.
+        Description of the people, for captions.
     annotations, images : Path
         The whole images' annotation file and folder.
     basic, headless : Path
         Dataset folders (`images/` and `annotations.json`).
     summary : dict
-        What `create_hicp` kept and left out, and why.
+        What `create_hicp` kept and dropped, and why.
     """
 
     kind: str
@@ -43,7 +43,7 @@ class Source:
 
     @property
     def limits(self) -> list[str]:
-        """What these people cannot show, a sentence each."""
+        """Limits of these data, a sentence each."""
         basic = read_annotations(self.basic / "annotations.json")
         n_images = len(set(source_images(basic).values()))
         some = (basic.visibility[~basic.is_crowd] > 0).any(axis=0)
@@ -69,7 +69,7 @@ def open_source(
     seed: int = 0,
     min_pixels: int = 20_000,
 ) -> Source:
-    """Open the study's people; what is missing in the cache is rendered and cropped first.
+    """Open a source of people; if not cached, scenes are rendered and cropped first.
 
     Parameters
     ----------

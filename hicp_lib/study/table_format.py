@@ -1,4 +1,4 @@
-"""Tables for people to read: columns in their units, values with their intervals, a column per case."""
+"""Readable tables: columns in their units, values with their intervals, a column per case."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +17,7 @@ _DECIMALS = {"cm": 1, "mm": 0, "s": 2, "ms": 0, "%": 0, "°": 1}
 
 
 def intervals_over(table: pd.DataFrame) -> str:
-    """What the intervals of a table with a column `n_people` are of, in the words of captions.
+    """Description of the intervals of a table with a column `n_people`, for captions.
 
     Examples
     --------
@@ -43,7 +43,7 @@ def in_units(table: pd.DataFrame, titles: Mapping[str, str], text: bool = False)
         Column -> its title; ``"retreat [cm]"`` for `retreat_m`. A title without a unit leaves the column as
         it is.
     text : bool
-        Numbers that have a unit as text with its usual decimals, a dash where they are NaN.
+        Whether to format numbers with a unit as text with its usual decimals, and NaN as a dash.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def in_units(table: pd.DataFrame, titles: Mapping[str, str], text: bool = False)
     Raises
     ------
     KeyError
-        If a column is not in the table, or its suffix cannot be brought to the unit.
+        If a column is not in the table, or its suffix cannot be converted to the unit.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def in_units(table: pd.DataFrame, titles: Mapping[str, str], text: bool = False)
 
 
 def with_bounds(value: float, low: float, high: float, digits: int = 2) -> str:
-    """A value with its interval, alone where it has none; a dash where it is NaN.
+    """A value with its interval, or alone without one; a dash for NaN.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def bounds_of(
     columns : sequence of str
         The value's and its interval's.
     factor : float
-        Multiplies the numbers, to bring them to another unit.
+        Factor that converts the numbers to another unit.
     digits : int
         Decimals.
 
@@ -141,7 +141,7 @@ def wide(
     text : Sequence[str], optional
         One per row; `bounds_of` the rows when left out.
     order : Sequence[str], optional
-        Of the new columns, those that occur; the order they come in when left out.
+        Order of the new columns; by default that of occurrence.
     """
     index = list(index)
     table = rows.assign(text=bounds_of(rows) if text is None else text)
@@ -152,7 +152,7 @@ def wide(
 
 
 def not_available(needed: str) -> pd.DataFrame:
-    """What stands in the place of a table that a recording has not got the material for."""
+    """Replaces a table that cannot be made from this recording."""
     return pd.DataFrame({"needs": [needed], "here": "not available for this recording"})
 
 

@@ -48,7 +48,7 @@ def test_another_opencv_is_named_with_a_remedy(tmp_path, monkeypatch):
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 5.0\n")
     check = doctor.check_opencv()
     assert check.status == doctor.FAIL
-    assert check.finding == "opencv-contrib-python in the place of opencv-python-headless"
+    assert check.finding == "opencv-contrib-python instead of opencv-python-headless"
     assert check.remedy == f"pip uninstall -y opencv-contrib-python; {reinstall}"
 
 

@@ -34,6 +34,6 @@ def test_rendering_ends_with_its_processes(tmp_path, to):
     assert len(workers) >= 2
     os.kill(started.pid, signal.SIGTERM) if to == "process" else os.killpg(started.pid, signal.SIGTERM)
     errors = started.communicate(timeout=20)[1]
-    assert (started.returncode, errors) == (143, "hicp: stopped; run the same command again to go on\n")
+    assert (started.returncode, errors) == (143, "hicp: stopped; run the same command again to continue\n")
     assert not psutil.wait_procs(workers, timeout=10)[1]
     assert not (tmp_path / "out" / "annotations.json").exists()

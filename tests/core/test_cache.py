@@ -87,7 +87,7 @@ def test_one_byte_of_the_code_or_the_data_changes_the_key_and_none_outside_does(
 
 def test_data_that_are_named_and_not_there_are_told(copy):
     (copy / "data" / "icub.json").unlink()
-    with pytest.raises(InputError, match=r"icub\.json: is not there, and a result follows from it"):
+    with pytest.raises(InputError, match=r"icub\.json: is missing, and a result depends on it"):
         code(["hicp_lib.robot.tables"], library=copy / "hicp_lib", data=copy / "data")
 
 

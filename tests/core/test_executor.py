@@ -77,7 +77,7 @@ def test_a_fault_of_a_job_is_raised_as_it_is(tmp_path, kind):
 
 def test_a_process_that_is_killed_is_told_in_one_line(tmp_path):
     jobs = [("a", end), ("b", partial(write_pid, name="b"))]
-    with pytest.raises(InputError, match="^a process that worked was killed .* run the same command again"):
+    with pytest.raises(InputError, match="^a worker process was killed .* run the same command again"):
         list(run_jobs(jobs, 2, folder=tmp_path))
 
 

@@ -115,7 +115,7 @@ def test_only_files_are_read(tmp_path, kind):
         path.mkdir()
         if "fifo" in kind:
             os.mkfifo(path / "x.db3")
-    with pytest.raises(InputError, match="x: is no file and no folder of files"):
+    with pytest.raises(InputError, match="x: is neither a file nor a folder of files"):
         limited_child(path, answer)
 
 

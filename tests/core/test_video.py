@@ -38,5 +38,5 @@ def test_frames_come_in_order_with_their_times(tmp_path, suffix):
 def test_what_is_no_video_is_refused(tmp_path):
     path = tmp_path / "clip.mp4"
     path.write_bytes(b"no video")
-    with pytest.raises(InputError, match=r"clip\.mp4: is no video"):
+    with pytest.raises(InputError, match=r"clip\.mp4: is not a video"):
         open_video(path)

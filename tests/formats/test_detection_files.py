@@ -95,7 +95,7 @@ def test_a_score_that_is_no_number_is_not_written_as_one(tmp_path):
     ("change", "told"),
     [
         (lambda table: table.drop(columns="u_px"), "has no column 'u_px'; expected a table with image_id"),
-        (lambda table: table.assign(keypoint="wing"), "is no table that hicp detect wrote .*wing"),
+        (lambda table: table.assign(keypoint="wing"), "is not a table written by hicp detect .*wing"),
     ],
 )
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])

@@ -175,7 +175,7 @@ def test_of_lines_with_the_same_time_the_first_is_read_and_the_rest_counted(tmp_
     path.write_text("# timestamp tx ty tz qx qy qz qw\n" + "\n".join(lines))
     times_s, T = read_poses(path)
     assert times_s.tolist() == [1, 1.5, 2] and T[:, 0, 3].tolist() == [0, 1, 4]
-    assert remarks(path, times_s) == ["3 lines repeat the time before and are passed over"]
+    assert remarks(path, times_s) == ["3 lines repeat the time before and are skipped"]
     path.write_text("\n".join(lines[:2]))
     assert remarks(path, read_poses(path)[0]) == []
 

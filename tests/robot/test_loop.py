@@ -163,7 +163,7 @@ def test_no_stream_of_keypoints_breaks_a_bound(icub, home, seed):
 
 
 def test_unreachable_posts_are_refused(icub):
-    with pytest.raises(ValueError, match="choose a nearer place"):
+    with pytest.raises(ValueError, match="choose a nearer position"):
         home_posture(icub, post_m=np.array([-3.0, 0, 0]))
 
 

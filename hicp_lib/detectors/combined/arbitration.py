@@ -1,14 +1,14 @@
-"""Whose hand is it: from many sightings of hands to at most one left and one right hand per body.
+"""Assign hands to bodies: from many sightings to at most one left and one right hand per body.
 
-Several looks at an image show the same hand more than once, show other people's hands, and show hands
-where there are none. Three rules, in this order:
+Several runs of the hand model on parts of an image give the same hand more than once, other people's hands,
+and hands where there are none. Three rules are applied, in this order:
 
-1. *Duplicates.* Sightings whose roots lie closer together than a share of the hand's size are one hand;
-   its points are the medians of theirs, its scores say how many they are and how well they agree.
-2. *Refusal.* A hand whose root is farther from a wrist than a share of the forearm is not that wrist's.
-   An arm without a wrist takes hands within reach of its elbow, and failing that of its shoulder.
-3. *Assignment.* Hands go to arms so that the sum of distances, in forearms, is smallest. Left and right
-   are the arm's, whatever the hand model says.
+1. *Duplicates.* Sightings whose roots are closer than a fraction of the hand's size are one hand; its points
+   are the medians of theirs, and its scores reflect their number and agreement.
+2. *Refusal.* A hand whose root is farther from a wrist than a fraction of the forearm does not belong to it.
+   An arm without a wrist takes hands within reach of its elbow or, without an elbow, of its shoulder.
+3. *Assignment.* Hands are assigned to arms so that the sum of distances, in forearms, is smallest. Left and
+   right are those of the arm, not those of the hand model.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ with needs("mediapipe"):
     from scipy.optimize import linear_sum_assignment
 
 SIDES = np.stack([LEFT_HAND, RIGHT_HAND])
-_REFUSED = 1e6  # a distance no hand is assigned at; finite, as the solver wants it
+_REFUSED = 1e6  # beyond any distance of assignment; finite, as the solver needs it
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,12 @@ class ArbitrationRule:
     Attributes
     ----------
     same_hand : float
-        Roots closer than this share of the smaller hand's size are one hand's (size: from the root to the
-        farthest point).
+        Roots closer than this fraction of the smaller hand's size belong to one hand (size: from the root to
+        the farthest point).
     wrist_reach, elbow_reach, shoulder_reach : float
         Farthest root from the arm's last given joint, in forearms.
     alone, scatter : float
-        What sightings are worth, see `merge_duplicates`.
+        Weights of sightings, see `merge_duplicates`.
     """
 
     same_hand: float = threshold(0.5, f"{SEED_11}: 0.35 and 0.7 within .01")
@@ -59,10 +59,10 @@ class Hands:
     Attributes
     ----------
     keypoints_px : array, shape (n, 21, 2)
-        The root is given, others may be NaN.
+        The root is always given, others may be NaN.
     scores : array, shape (n, 21)
     sides : array, shape (n,)
-        What the hand model calls them: 0 left, 1 right.
+        According to the hand model: 0 left, 1 right.
     """
 
     keypoints_px: np.ndarray
@@ -71,14 +71,14 @@ class Hands:
 
     @classmethod
     def of(cls, found: Detections) -> Hands:
-        """The hands in detections; one without its root is none."""
+        """The hands in detections; those without a root are dropped."""
         rows, sides = np.nonzero(np.isfinite(found.keypoints_px[:, SIDES[:, 0]]).all(axis=-1))
         points = SIDES[sides]
         return cls(found.keypoints_px[rows[:, None], points], found.scores[rows[:, None], points], sides)
 
     @classmethod
     def concatenate(cls, parts: list[Hands]) -> Hands:
-        """All sightings of several looks."""
+        """All sightings of several runs."""
         none = cls(np.zeros((0, 21, 2)), np.zeros((0, 21)), np.zeros(0, dtype=int))
         rows = [(part.keypoints_px, part.scores, part.sides) for part in [none, *parts]]
         return cls(*map(np.concatenate, zip(*rows, strict=True)))
@@ -92,10 +92,10 @@ class Hands:
 
 
 def merge_duplicates(hands: Hands, rule: ArbitrationRule) -> Hands:
-    """One hand for all sightings of it: the medians of their points, the side most of them say.
+    """Merge sightings of the same hand: the medians of their points, the side of the majority.
 
-    A point's score is the median of the sightings', times what their agreement is worth: 1 - `alone` / n of n
-    sightings, times exp(-`scatter` d) for a mean distance d from the median, in sizes of the hand.
+    A point's score is the median of the sightings' scores, times a factor for their agreement: 1 - `alone` /
+    n for n sightings, times exp(-`scatter` d) for a mean distance d from the median, in sizes of the hand.
     """
     roots = hands.keypoints_px[:, 0]
     sizes = np.nanmax(np.linalg.norm(hands.keypoints_px - roots[:, None], axis=-1), axis=1, initial=0)
@@ -104,7 +104,7 @@ def merge_duplicates(hands: Hands, rule: ArbitrationRule) -> Hands:
     left = np.ones(len(hands), dtype=bool)
     merged = []
     while left.any():
-        # First the hand with the most sightings around it; among equals the first seen.
+        # Start with the hand with the most sightings around it; among equals the first one.
         centre = np.where(left, (near & left).sum(axis=1), 0).argmax()
         merged.append(_median(hands.take(near[centre] & left), rule))
         left &= ~near[centre]
@@ -112,7 +112,7 @@ def merge_duplicates(hands: Hands, rule: ArbitrationRule) -> Hands:
 
 
 def _median(same: Hands, rule: ArbitrationRule) -> Hands:
-    given = np.isfinite(same.keypoints_px).all(axis=(0, 2))  # points that every sighting gives
+    given = np.isfinite(same.keypoints_px).all(axis=(0, 2))  # points that all sightings give
     points = np.where(given[:, None], np.median(same.keypoints_px, axis=0), same.keypoints_px[0])
     scores = np.where(given, np.median(same.scores, axis=0), same.scores[0])
     size_px = np.nanmax(np.linalg.norm(points - points[0], axis=-1))
@@ -122,7 +122,7 @@ def _median(same: Hands, rule: ArbitrationRule) -> Hands:
 
 
 def distances(arms: Arms, hands: Hands, rule: ArbitrationRule) -> np.ndarray:
-    """How far hands are from where arms end, in forearms.
+    """Distances of hands from the ends of arms, in forearms.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def distances(arms: Arms, hands: Hands, rule: ArbitrationRule) -> np.ndarray:
     Returns
     -------
     array, shape (n_bodies, 2, n_hands)
-        inf where the arm refuses the hand.
+        inf where the hand is out of the arm's reach.
     """
     result = np.full((*arms.scales_px.shape, len(hands)), np.inf)
     joints = (
@@ -149,7 +149,7 @@ def distances(arms: Arms, hands: Hands, rule: ArbitrationRule) -> np.ndarray:
 
 
 def assign(away: np.ndarray) -> np.ndarray:
-    """Which hand each arm gets, from distances (n_bodies, 2, n_hands): (n_bodies, 2), -1 for none.
+    """The hand of each arm, from distances (n_bodies, 2, n_hands): (n_bodies, 2), -1 for none.
 
     Examples
     --------
@@ -165,7 +165,7 @@ def assign(away: np.ndarray) -> np.ndarray:
 
 
 def nearest_first(wrists_px: np.ndarray, hands: Hands, chosen: np.ndarray) -> np.ndarray:
-    """Assignment without arbitration: each hand, surest first, to the nearest wrist that is still free.
+    """Assignment without arbitration: each hand, highest score first, to the nearest free wrist.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def nearest_first(wrists_px: np.ndarray, hands: Hands, chosen: np.ndarray) -> np
         NaN where not given.
     hands : Hands
     chosen : array of int, shape (n_bodies, 2)
-        The hands that arms have already; -1 where an arm is free.
+        The hands already assigned; -1 where an arm is free.
 
     Returns
     -------
@@ -190,7 +190,7 @@ def nearest_first(wrists_px: np.ndarray, hands: Hands, chosen: np.ndarray) -> np
 
 
 def give_hands(bodies: Detections, hands: Hands, chosen: np.ndarray) -> Detections:
-    """Bodies with their chosen hands; an arm with none keeps what its body came with.
+    """Bodies with their chosen hands; an arm without one keeps the hand from the body detector.
 
     Parameters
     ----------
@@ -209,15 +209,15 @@ def give_hands(bodies: Detections, hands: Hands, chosen: np.ndarray) -> Detectio
 
 
 def in_pairs(hands: Hands) -> Detections:
-    """Instances of the k-th surest left with the k-th surest right hand, as the model calls them."""
+    """Instances of the k-th best left with the k-th best right hand, by the model's labels."""
     return _instances(hands, *_by_side(hands))
 
 
 def without_body(hands: Hands) -> Detections:
-    """Instances of hands that belong to no body found: the k-th surest left with the k-th surest right.
+    """Instances of hands that belong to no detected body: the k-th best left with the k-th best right.
 
-    Sides are the model's, there is nothing better; but of two hands with the same side, the less sure
-    takes the other: nobody has two left hands.
+    Sides are the model's labels, as nothing better is known; but of two hands with the same side, the one
+    with the lower score gets the other side, since nobody has two left hands.
     """
     lefts, rights = _by_side(hands)
     more, fewer = (lefts, rights) if len(lefts) > len(rights) else (rights, lefts)
@@ -227,13 +227,13 @@ def without_body(hands: Hands) -> Detections:
 
 
 def _by_side(hands: Hands) -> tuple[list[int], list[int]]:
-    """Rows of the left and of the right hands, surest first."""
+    """Rows of the left and of the right hands, highest score first."""
     order = np.argsort(-hands.scores.mean(axis=1), kind="stable").tolist()
     return [row for row in order if hands.sides[row] == 0], [row for row in order if hands.sides[row] == 1]
 
 
 def _instances(hands: Hands, lefts: list[int], rights: list[int]) -> Detections:
-    """People without a body: the k-th left with the k-th right hand, as far as there are both."""
+    """People without a body: the k-th left paired with the k-th right hand, where both exist."""
     chosen = np.full((max(len(lefts), len(rights)), 2), -1)
     chosen[: len(lefts), 0], chosen[: len(rights), 1] = lefts, rights
     n = len(chosen)

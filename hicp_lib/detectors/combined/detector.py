@@ -1,18 +1,18 @@
 """The paper's proposal: one detector for the body and another for the hands.
 
-`combined:BODY+HANDS` looks for hands where the body says they are, and everywhere else:
+`combined:BODY+HANDS` searches for hands at the body's wrists, and in the whole image:
 
 1. the body detector runs once;
-2. the hand model looks at a square around each forearm's end (`hand_squares`), enlarged when small, and
-   if asked to at its mirror image: its errors there are others;
-3. it looks at the whole image and, when that is oblong, at overlapping squares along it: a hand model
-   is shown a square, and a long image makes small hands in it. These looks find the hands of bodies
-   that were not found or whose arms are wrong, and every further sighting steadies a hand's points;
-4. all it saw is arbitrated (`arbitration`): one hand per arm, left and right by the body's anatomy.
+2. the hand model is run on a square around each forearm's end (`hand_squares`), enlarged when small, and
+   optionally on its mirror image, where the model makes different errors;
+3. it is run on the whole image and, if that is oblong, on overlapping squares along it: a hand model's input
+   is a square, in which a long image makes hands small. These runs find the hands of bodies that were not
+   found or whose arms are wrong, and every further sighting makes a hand's points more precise;
+4. all sightings are assigned to arms (`arbitration`): one hand per arm, left and right by the body's anatomy.
 
-Hands that no arm takes are instances of their own if they lie out of every body's reach; otherwise
-the body says that they are elsewhere, and they are refused. Where no hand is found, an arm keeps the
-hand that the body detector itself gave, if it did.
+Hands that no arm takes become instances of their own if they are out of every body's reach; otherwise they
+contradict a body's arms and are dropped. If no hand is found, an arm keeps the hand of the body detector, if
+there is one.
 """
 
 from collections.abc import Callable
@@ -34,26 +34,26 @@ _Looks = Callable[[], list[Hands]]
 
 
 class Combined:
-    """A body detector and a hand detector as one.
+    """A body detector and a hand detector combined.
 
     Parameters
     ----------
     body, hands : Detector
         Ready detectors; `hands` gives hand points in the Halpe layout.
     looks : str
-        Where hands are looked for, joined by +: "wrists" (a square at each forearm's end), "mirrored" (that
+        Where hands are searched for, joined by +: "wrists" (a square at each forearm's end), "mirrored" (that
         square mirrored), "image" (the whole of it), "along" (squares along an oblong image).
     arbitrate : bool
-        Apply the rules of `arbitration`; if not, a wrist takes the surest hand of its own squares, and
-        further hands go to the nearest free wrist.
+        Apply the rules of `arbitration`; if not, a wrist takes the hand with the highest score in its own
+        squares, and further hands go to the nearest free wrist.
     agreement : bool
-        Hands that are arbitrated are as sure as the sightings of them are many and agree; if not, as the hand
-        model says.
+        Scores of assigned hands grow with the number and agreement of their sightings; if not, they are the
+        hand model's.
     min_side_px : int
         Smaller squares are enlarged to this.
     side_by_side : bool
-        Look at the whole image for hands while the body detector looks for bodies: an answer
-        comes sooner where a processor is free, which is what a robot waits for.
+        Run the hand model on the whole image while the body detector runs: lower latency if a processor is
+        free, as needed on a robot.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class Combined:
         return arbitration.give_hands(bodies, hands, chosen).concatenate(arbitration.without_body(strangers))
 
     def _within_reach(self, arms: Arms, hands: Hands) -> np.ndarray:
-        """Which hands (n,) some body could have, were the rest of its arms unknown."""
+        """Which hands (n,) are within reach of some body, judged by its shoulders and elbows only."""
         unknown = np.full_like(arms.wrists_px, np.nan)
         loose = Arms(unknown, unknown, arms.shoulders_px, arms.scales_px)
         reached = np.isfinite(arbitration.distances(loose, hands, self._rule))

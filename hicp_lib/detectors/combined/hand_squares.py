@@ -1,10 +1,10 @@
-"""Where a body's hands should be: squares around the forearms' ends, cut out for a hand model.
+"""Squares around the ends of the forearms, where a body's hands should be, cut out for a hand model.
 
 The rule is OpenPose's (Simon et al., "Hand keypoint detection in single images using multiview
-bootstrapping", CVPR 2017, and its program): the hand lies a third of the forearm beyond the wrist, and
-the square's side is a multiple of the arm's scale. That scale is the forearm's length in the
-image, or a share of the upper arm's or the shoulders' where these say more: a forearm that points at
-the camera, as at close range, looks short.
+bootstrapping", CVPR 2017, and its program): the hand lies a third of the forearm beyond the wrist, and the
+square's side is a multiple of the arm's scale. That scale is the forearm's length in the image, or a fraction
+of the upper arm's or the shoulders' if that is larger: a forearm that points at the camera, as at close
+range, looks short.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from hicp_lib.core.detections import Detections
 _SHOULDERS, _ELBOWS, _WRISTS = [5, 6], [7, 8], [9, 10]
 
 
-# Length over width from which an image is looked at in squares. On seed 11 of an earlier set of bodies, none
-# of them held out, the AP of hands is within .01 from 1.15 to 1.7; a camera's images (4:3) have two looks
-# less from 1.5 on.
+# Aspect ratio from which an image is processed in squares. On seed 11 of an earlier set of bodies, none of
+# them held out, the AP of hands is within .01 from 1.15 to 1.7; with 1.5 or more, a camera's images (4:3)
+# need two runs less.
 MIN_OBLONG = 1.5
 
-# What thresholds were chosen on, by the AP of hands in 100 scenes of development people; first on an earlier
-# set of bodies, none of them held out.
+# The data on which thresholds were chosen, by the AP of hands in 100 scenes of development identities; first
+# on an earlier set of bodies, none of them held-out.
 SEED_11, SEED_11_THUNDER = "seed 11, both body detectors", "seed 11, bodies by movenet-thunder"
 
 
@@ -38,19 +38,19 @@ def threshold(value: Any, chosen: str) -> Any:
 
 @dataclass(frozen=True)
 class SquareRule:
-    """How squares are laid; each field says in its metadata how its value was chosen, and on what data.
+    """How squares are placed; each field says in its metadata how its value was chosen, and on what data.
 
     Attributes
     ----------
     beyond_wrist : float
-        Where the centre is, in forearms from the wrist, away from the elbow.
+        Position of the centre, in forearms beyond the wrist, away from the elbow.
     side : float
         In units of the arm's scale.
     forearms_per_upper_arm, forearms_per_shoulders : float
-        What the forearm's length is taken to be at least, as a share of the upper arm's and the shoulders' in
-        the image.
+        Lower bounds of the forearm's length, as fractions of the upper arm's length and the shoulders'
+        distance in the image.
     min_score : float
-        Wrists of a lower score have no square.
+        Wrists with a lower score get no square.
     """
 
     beyond_wrist: float = threshold(0.33, "OpenPose's")
@@ -69,7 +69,7 @@ class Arms:
     wrists_px, elbows_px, shoulders_px : array, shape (n, 2, 2)
         NaN where not given.
     scales_px : array, shape (n, 2)
-        Length of the forearm, see `SquareRule`; NaN where nothing tells.
+        Length of the forearm, see `SquareRule`; NaN if unknown.
     """
 
     wrists_px: np.ndarray
@@ -103,7 +103,7 @@ class Square:
 
     @classmethod
     def around(cls, centre_px: np.ndarray, side_px: float) -> Square:
-        """The square of about this side whose middle lies nearest to a centre, pixel centres at integers.
+        """The square of about this side whose centre is nearest to a position, pixel centres at integers.
 
         Examples
         --------
@@ -115,7 +115,7 @@ class Square:
         return cls(left, top, side)
 
     def overlaps(self, image: np.ndarray) -> bool:
-        """Whether any of it lies in the image."""
+        """Whether it overlaps the image."""
         height, width = image.shape[:2]
         return -self.side_px < self.left_px < width and -self.side_px < self.top_px < height
 
@@ -140,7 +140,7 @@ class Square:
 
 
 def hand_squares(arms: Arms, rule: SquareRule, image: np.ndarray) -> list[tuple[int, int, Square]]:
-    """The square of every hand that may lie in the image.
+    """The square of every hand that may be in the image.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def hand_squares(arms: Arms, rule: SquareRule, image: np.ndarray) -> list[tuple[
     centres = arms.wrists_px + rule.beyond_wrist * forearm
     squares = []
     for person, side in np.argwhere(np.isfinite(centres).all(axis=-1) & np.isfinite(arms.scales_px)):
-        # A square larger than the image would show it smaller than the image itself does.
+        # A square larger than the image would make the hand smaller than the whole image does.
         side_px = min(rule.side * arms.scales_px[person, side], max(image.shape[:2]))
         square = Square.around(centres[person, side], side_px)
         if square.overlaps(image):
@@ -166,7 +166,7 @@ def hand_squares(arms: Arms, rule: SquareRule, image: np.ndarray) -> list[tuple[
 
 
 def squares_along(image: np.ndarray) -> list[Square]:
-    """Squares along an oblong image, as wide as its short side, each half over the next or more.
+    """Squares along an oblong image, as wide as its short side, overlapping by at least half.
 
     Examples
     --------

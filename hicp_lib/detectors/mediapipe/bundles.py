@@ -1,10 +1,10 @@
 """Task bundles for MediaPipe, assembled in memory from the separate model files.
 
-MediaPipe's Tasks API reads a `.task` bundle: a zip, stored and aligned, of two TFLite models.
-The package index has the models but no bundles. They go in as they are, except that the model of
-the pose landmarks lacks the metadata that tells the task how to scale pixels. It is added here:
-this model takes [0, 1], as MediaPipe's own graph for the same file feeds it. What MediaPipe has for that is
-plain Python and is loaded file by file: MediaPipe itself runs in a process of its own only.
+MediaPipe's Tasks API reads a `.task` bundle: a zip, stored and aligned, of two TFLite models. The package
+index has the models but no bundles. They are used unchanged, except that the model of the pose landmarks
+lacks the metadata that tells the task how to scale pixels. It is added here: this model takes [0, 1], as in
+MediaPipe's own graph for the same file. MediaPipe's code for this is plain Python and is loaded file by file,
+since MediaPipe itself runs only in a separate process.
 """
 
 import io
@@ -61,13 +61,13 @@ def read_bundle(task: str, path: str | Path) -> bytes:
     Raises
     ------
     InputError
-        If the file is unreadable, lacks a model the task needs or, if it was fetched by name, is not the
-        one that was recorded then.
+        If the file is unreadable, lacks a model that the task needs or, if it was fetched by name, differs
+        from the one recorded then.
     """
     content, found = read_bytes(path, f"give the .task file of the {task} landmarker"), dict[str, bytes]()
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            # MediaPipe reads them where they lie: a compressed one is none, nor a bomb.
+            # MediaPipe reads them in place, so compressed members are refused, which also excludes zip bombs.
             stored = [one for one in archive.infolist() if one.compress_type == zipfile.ZIP_STORED]
             found = {one.filename: archive.read(one) for one in stored if one.filename in BUNDLES[task]}
     except Exception as error:  # zipfile raises many kinds for damaged archives
@@ -117,7 +117,7 @@ def _pack(tree: Any, identifier: bytes) -> bytes:
 
 @cache
 def _of_mediapipe(file: str) -> ModuleType:
-    """One file of the package, as a module that nobody else sees."""
+    """One file of the package as a private module."""
     path = program_folder() / file
     spec = spec_from_file_location(f"{__name__}.{path.stem}", path)
     assert spec and spec.loader

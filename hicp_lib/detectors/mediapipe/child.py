@@ -1,10 +1,10 @@
-"""The program of MediaPipe's own process: one task, then an answer to every image.
+"""The program of MediaPipe's separate process: sets up one task, then returns a result for every image.
 
-It is run by its path and imports nothing of this package, so that it starts in any environment, and soon.
+It is run by its path and imports nothing of this package, so that it starts quickly in any environment.
 Messages go through a socket whose descriptor is the last argument: a head in JSON, a body of plain bytes. The
-first one's head tells the task's options and its body is the bundle; every other one tells the `shape` of the
-RGB image that lies in memory both sides see, a file whose descriptor is the argument before: through a pipe a
-call would take a tenth longer. Answers are arrays of float64 (`shape`) or an `error` in one line.
+first head contains the task's options, and its body is the bundle; every other head contains the `shape` of
+the RGB image in shared memory, a file whose descriptor is the argument before (through a pipe a call would
+take a tenth longer). Results are arrays of float64 (`shape`) or an `error` in one line.
 """
 
 import itertools
@@ -61,7 +61,7 @@ def receive(pipe: Connection) -> tuple[dict, bytes]:
 
 def _serve(pipe: Connection, folder: str, shared: int) -> None:
     head, bundle = receive(pipe)
-    # Whatever hangs in the library is ended by the system, also when nobody waits for it any more.
+    # If the library hangs, the system ends this process, even if the caller is gone.
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGALRM])
     limit_s = head.pop("limit_s")
@@ -88,14 +88,14 @@ def _serve(pipe: Connection, folder: str, shared: int) -> None:
 def detection(
     bundle: bytes, task: str, tracking_hz: float = 0.0, **options: Any
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """A function from an image to what `_poses` or `_hands` say.
+    """A function from an image to the result of `_poses` or `_hands`.
 
     Parameters
     ----------
     bundle : bytes
     task : {"pose", "hand"}
     tracking_hz : float, optional
-        Above 0, images are those of a video of this rate: what was found in one is looked for in the next.
+        Above 0, images are those of a video of this rate, and detections are tracked from one to the next.
     **options : object
         As of `landmarker`.
 
@@ -119,11 +119,11 @@ def landmarker(bundle: bytes, task: str, n: int, min_score: float, follows: bool
     bundle : bytes
     task : {"pose", "hand"}
     n : int
-        Most people, or hands.
+        Maximum number of people, or hands.
     min_score : float
         Threshold of the detector, of the presence check and of the tracking.
     follows : bool, optional
-        Whether images are those of a video. If not, each stands by itself.
+        Whether images are those of a video. If not, each is processed independently.
     """
     base_options = import_module("mediapipe.tasks.python.core.base_options")
     module = import_module(f"{_VISION}.{task}_landmarker")
@@ -140,7 +140,7 @@ def landmarker(bundle: bytes, task: str, n: int, min_score: float, follows: bool
 
 
 def _leave_out(folder: str, *packages: str) -> None:
-    """Put empty packages in the place of MediaPipe's own, which load Matplotlib, audio and what not."""
+    """Replace some of MediaPipe's own packages, which load Matplotlib, audio and more, by empty ones."""
     for name in packages:
         package = ModuleType(name)
         package.__path__ = [os.path.join(folder, *name.split("."))]
@@ -176,7 +176,7 @@ def _main() -> None:
         pass
     except Exception as error:  # a broken library may raise anything
         send(pipe, {"error": _one_line(error)})
-    # Without closing the task: that would send usage metrics, and takes its time.
+    # Do not close the task: that would send usage metrics, and takes time.
     os._exit(0)
 
 

@@ -1,9 +1,9 @@
-"""MediaPipe's program: the installed package, or the one fetched into the cache as weights are.
+"""MediaPipe's program: the installed package, or the one fetched into the cache like weights.
 
-Its wheel declares opencv-contrib-python, whose files pip lays over those of the opencv-python-headless that
-everything here runs on, and which does not load where there is no display. What is used of MediaPipe needs no
-OpenCV. So no extra names the wheel: pip installs it by itself, held against the hashes in
-`data/mediapipe.txt`, into a folder where only MediaPipe's own process looks for it.
+Its wheel requires opencv-contrib-python, whose files would overwrite those of opencv-python-headless, which
+everything here uses, and which does not load without a display. The parts of MediaPipe used here need no
+OpenCV. So no extra names the wheel: pip installs it alone, checked against the hashes in
+`data/mediapipe.txt`, into a folder that only MediaPipe's own process searches.
 """
 
 import os
@@ -28,7 +28,7 @@ def program_folder() -> Path:
     Raises
     ------
     InputError
-        If it is neither installed nor fetched, or the extra with what it needs is missing.
+        If it is neither installed nor fetched, or the extra with its dependencies is missing.
     """
     package = find_spec("mediapipe")
     if package is not None and package.submodule_search_locations:
@@ -46,13 +46,13 @@ def program_version() -> str:
 
 
 def is_wanted(detectors: Sequence[str]) -> bool:
-    """Whether to fetch it with these: one of its own is named, or none is and the extra is installed."""
+    """Whether to fetch it too: one of its own weights is named, or none is and the extra is installed."""
     named = any(name.startswith("mediapipe") for name in detectors)
     return named or (not detectors and find_spec("absl") is not None)
 
 
 def fetch_program() -> bool:
-    """Get MediaPipe unless it is here; whether it was fetched now.
+    """Fetch MediaPipe if it is absent; returns whether it was fetched.
 
     Raises
     ------

@@ -1,22 +1,21 @@
 """MediaPipe Pose and Hands (Tasks API) as detectors.
 
-What MediaPipe gives and what is made of it:
+MediaPipe's outputs and how they are converted:
 
 - Landmarks are fractions of the image's width and height measured from its border, so a
   landmark at x lies at ``x * width - 0.5`` where pixel centres are integers. Landmarks
   outside the image are kept.
 - Pose: the score of a keypoint is its *visibility*, the probability of being inside the image
   and not occluded. (*Presence*, inside the image or not, says less and is not used.) MediaPipe
-  returns no score of the person; the mean score of the 17 COCO keypoints stands in.
-- Hands: there is no score per keypoint. Every point of a hand carries the hand's handedness
-  score, which says how sure the *side* is, not the position. The person score is the mean
-  over the hands of the instance.
-- Sides: the Tasks API labels hands for images that are not mirrored: "Left" is the person's left
-  hand. (The older solutions API means mirrored images, and has it the other way round.) The
-  tests hold this against rendered hands, of which about four in five get the true label.
-- Tracking: `tracking_hz` says that images are those of a video. What was found in an image is then looked for
-  where it was, and everywhere only when its score falls below the threshold; points are smoothed over time.
-  The answer then depends on the images before.
+  returns no score of the person; the mean score of the 17 COCO keypoints is used.
+- Hands: there is no score per keypoint. Every point of a hand gets the hand's handedness score, which is the
+  confidence in the *side*, not in the position. The person score is the mean over the hands of the instance.
+- Sides: the Tasks API labels hands for images that are not mirrored: "Left" is the person's left hand. (The
+  older solutions API assumes mirrored images and swaps the labels.) The tests check this with rendered hands,
+  of which about four in five get the true label.
+- Tracking: `tracking_hz` says that images are those of a video. A person is then searched for near the last
+  position, and in the whole image only when the score falls below the threshold; points are smoothed over
+  time. The result then depends on earlier images.
 """
 
 from pathlib import Path
@@ -35,14 +34,14 @@ _WRISTS = [9, 10]
 
 
 class _Task:
-    """One of MediaPipe's tasks, in a process of its own."""
+    """One of MediaPipe's tasks, in a separate process."""
 
     name: str
 
     def _prepare(
         self, task: str, n: int, min_score: float, model: str | Path | None, tracking_hz: float
     ) -> None:
-        """Its start takes half a second and waits for the first image; of a given bundle it does not."""
+        """Starts at the first image, as it takes half a second; with a user's bundle at once."""
         bundle = bundles.read_bundle(task, model) if model else bundles.assemble(task)
         self._process = IsolatedProcess(
             [child.__file__, str(program_folder().parent)],
@@ -66,7 +65,7 @@ class MediaPipePose(_Task):
     Parameters
     ----------
     num_poses : int
-        Most people to return per image; 1, as in the paper, suits crops of one person.
+        Maximum number of people per image; 1, as in the paper, suits crops of one person.
     min_score : float
         Threshold of MediaPipe's person detector and of its presence check.
     model : str or Path, optional
@@ -99,13 +98,13 @@ class MediaPipePose(_Task):
 class MediaPipeHands(_Task):
     """MediaPipe Hand Landmarker: 21 landmarks of each hand.
 
-    One instance holds the best left and the best right hand; further hands pair up in the
-    same way, by falling score.
+    One instance holds the best left and the best right hand; further hands are paired in the same way, by
+    decreasing score.
 
     Parameters
     ----------
     num_hands : int
-        Most hands to return per image.
+        Maximum number of hands per image.
     min_score : float
         Threshold of MediaPipe's palm detector and of its presence check.
     model : str or Path, optional
@@ -137,19 +136,19 @@ class MediaPipeHands(_Task):
 class MediaPipe:
     """Pose and hands of the whole image as one detector.
 
-    A hand goes to the nearest wrist of a body that has no hand yet, and takes its side from
-    there: the body's left and right are far more often correct than the hand's own label
-    (on 135 plainly rendered hands with known sides: all against 106). A hand left over becomes
-    an instance of its own, sided by its label.
+    A hand goes to the nearest wrist of a body that has no hand yet, and takes its side from there: the body's
+    left and right are far more often correct than the hand's own label (on 135 plainly rendered hands with
+    known sides: all against 106). A remaining hand becomes an instance of its own, with the side of its
+    label.
 
     Parameters
     ----------
     num_people : int
-        Most people to return per image (and half the number of hands).
+        Maximum number of people per image (with two hands each).
     min_score : float
         Threshold of both detectors.
     tracking_hz : float, optional
-        As of its parts.
+        As for its parts.
     """
 
     name = "mediapipe"
@@ -168,12 +167,12 @@ class MediaPipe:
 
 
 def attach_hands(bodies: Detections, found: Detections) -> Detections:
-    """Give each hand found, surest first, to the nearest wrist that has none yet, whatever its label says.
+    """Assign each hand, highest score first, to the nearest wrist without a hand, ignoring its label.
 
     Returns
     -------
     Detections
-        The bodies with their hands, then instances of the hands that found no free wrist.
+        The bodies with their hands, then instances of the hands without a free wrist.
     """
     hands = Hands.of(found)
     chosen = nearest_first(bodies.keypoints_px[:, _WRISTS], hands, np.full((len(bodies), 2), -1))

@@ -1,12 +1,12 @@
 """MoveNet's networks: Thunder and Lightning, top-down, one pose per box; MultiPose, bottom-up.
 
-Each box (the whole image, unless told otherwise) becomes a square of the network's side, black where the
-image ends. The network decodes itself: y, x (as fractions of the square) and score of COCO's 17 keypoints, of
-the person nearest to the square's middle. `tools/bake_tfjs.py` made its files.
+Each box (by default the whole image) is scaled to a square of the network's side, padded with black. The
+network decodes itself: y, x (as fractions of the square) and score of COCO's 17 keypoints, of the person
+nearest to the square's middle. `tools/bake_tfjs.py` made its files.
 
-MultiPose finds up to six people of a whole image, without anyone looking for them first. The image is fitted
-into a square, black below or beside it; the network gives six rows of 17 keypoints likewise, then a box, and
-the person's score.
+MultiPose finds up to six people in a whole image, without a person finder. The image is fitted into a square
+padded with black; the network gives six rows of 17 keypoints in the same form, then a box, and the person's
+score.
 """
 
 from pathlib import Path
@@ -33,8 +33,8 @@ class MoveNetThunder:
     person_min_score, person_max_overlap : float, optional
         Thresholds of the person finder.
     padding : float
-        What boxes are grown by before they become squares. Of 1.0, 1.1, 1.25 and 1.5, 1.0 was best on
-        development people (seed 11, 100 scenes), by .01 AP on Basic and .05 on Headless.
+        Factor by which boxes are enlarged before they become squares. Of 1.0, 1.1, 1.25 and 1.5, 1.0 was best
+        on development identities (seed 11, 100 scenes), by .01 AP on Basic and .05 on Headless.
     provider : str
     threads : int
         See `hicp_lib.detectors.onnx.session.open_model`.
@@ -80,7 +80,7 @@ class MoveNetThunder:
 
 
 class MoveNetLightning(MoveNetThunder):
-    """MoveNet Lightning: Thunder's smaller sister, with the backbone of MoveNet MultiPose."""
+    """MoveNet Lightning: smaller than Thunder, with the backbone of MoveNet MultiPose."""
 
     name = "movenet-lightning"
 
@@ -94,7 +94,7 @@ class MoveNetMultiPose:
     Parameters
     ----------
     min_person_score : float
-        People below are not given; the network always gives six rows.
+        People with a lower score are dropped; the network always gives six rows.
     provider : str
     threads : int
         See `hicp_lib.detectors.onnx.session.open_model`.

@@ -1,11 +1,11 @@
-"""From person boxes to the pixels a top-down network sees, and back.
+"""Transforms from person boxes to a top-down network's input, and back.
 
-The box is padded and grown to the network's aspect ratio about its centre. The classic transform
-(Xiao et al., "Simple baselines for human pose estimation and tracking", ECCV 2018) maps it onto the
-input so that the centre falls on (width / 2, height / 2), and keypoints go back by the fraction of the
-grid they lie at, whatever the grid: the heat map's cells or the bins of SimCC. Unbiased data
-processing (Huang et al., "The devil is in the details", UDP, CVPR 2020) measures all three, box, input
-and grid, from the first pixel's centre to the last one's: their sizes less one.
+The box is padded and grown to the network's aspect ratio about its centre. The classic transform (Xiao et
+al., "Simple baselines for human pose estimation and tracking", ECCV 2018) maps it onto the input so that the
+centre falls on (width / 2, height / 2). Keypoints are mapped back by their relative position on the grid,
+which is the heat map's cells or the bins of SimCC. Unbiased data processing (Huang et al., "The devil is in
+the details", UDP, CVPR 2020) measures all three, box, input and grid, from the first pixel's centre to the
+last one's: their sizes minus one.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Regions:
         input_size_px : tuple of int
             Width and height.
         padding : float
-            What the boxes are grown by.
+            Factor by which the boxes are enlarged.
         udp : bool
 
         Examples
@@ -72,7 +72,7 @@ class Regions:
         return len(self.centres_px)
 
     def crop(self, image: np.ndarray, input_size_px: tuple[int, int]) -> list[np.ndarray]:
-        """What lies in each region, scaled to (width, height) bilinearly; black outside the image."""
+        """The pixels of each region, scaled bilinearly to (width, height); black outside the image."""
         crops = []
         spans = self._span(input_size_px)
         for centre, zoom in zip(self.centres_px, spans / self.sizes_px, strict=True):

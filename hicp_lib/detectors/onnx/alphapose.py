@@ -17,9 +17,9 @@ from hicp_lib.detectors.onnx.session import OnnxModel, open_model
 
 # Points of face and hands at the end of a set, or of the hands alone.
 _N_INTEGRAL = {"halpe136": 110, "wholebody133": 110, "halpe68_noface": 42}
-# By the name of the decoding: what a keypoint's score is.
+# Meaning of a keypoint's score, by the name of the decoding.
 _SCORES: dict[str, str] = TEXTS["alphapose scores"]
-# Taken off the R, G and B values, which are then divided.
+# Subtracted from the R, G and B values, which are then divided.
 _MEAN, _STD = (0.406 * 255, 0.457 * 255, 0.480 * 255), (255.0,) * 3
 # Weight of the greatest keypoint score in a person's score.
 _GREATEST_WEIGHT = 1.25
@@ -40,7 +40,7 @@ class AlphaPose:
         See `hicp_lib.detectors.onnx.person_boxes.PersonBoxes`.
     decoding : str, optional
         "heatmap", "integral" (symmetric integral regression) or "combined" (face and hands integral); if
-        None, told by the network's answer to the mean colour.
+        None, detected from the network's output for the mean colour.
     flip_test : bool
     input_size_px : list of int, optional
     provider : str
@@ -92,15 +92,15 @@ class AlphaPose:
         return Detections.of_parts(positions_px, np.clip(scores, 0, 1), person_scores, self._net.convention)
 
     def describe(self) -> list[Fact]:
-        """What is taken for granted about the model."""
-        told = "told by the network's answer to the mean colour" if self._is_told else "given"
+        """What is assumed about the model."""
+        told = "from its output for the mean colour" if self._is_told else "given"
         score = {"score": _SCORES[self.decoding], "greatest_weight": _GREATEST_WEIGHT}
         own = facts("alphapose", told=told, **score, **self.settings)
         return [*self._net.describe(), *own, *self._boxes.describe()]
 
 
 def _told_decoding(maps: np.ndarray, n_integral: int) -> str:
-    """Heat maps stay near 0 where nobody is; logits for integral regression lie far below."""
+    """Without a person, heat maps stay near 0; logits for integral regression are far below."""
     is_logits = np.median(maps[0], axis=(1, 2)) < -1
     if is_logits.all():
         return "integral"

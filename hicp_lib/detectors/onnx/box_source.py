@@ -1,4 +1,4 @@
-"""Where the boxes of the people come from: the annotations, the whole image, or a person detector."""
+"""Sources of person boxes: the annotations, the whole image, or a person detector."""
 
 from pathlib import Path
 from typing import Any
@@ -19,15 +19,15 @@ class BoxSource:
     Parameters
     ----------
     boxes : str or None
-        "gt" (annotated boxes, handed to `detect`), "image" (one person, the whole image) or "detected"; by
-        default detected with a person model, and otherwise the image.
+        "gt" (annotated boxes, passed to `detect`), "image" (one person, the whole image) or "detected"; by
+        default detected if there is a person model, and otherwise the image.
     person_model : str or Path or None
-        ONNX export of YOLOX or RTMDet; without it, NanoDet, which comes with the library, detects.
+        ONNX export of YOLOX or RTMDet; without it, NanoDet is used, which comes with the library.
     provider : str
     threads : int
     **own : object
-        Further options of `hicp_lib.detectors.onnx.person_boxes.PersonBoxes`, or of NanoDet; None stands for
-        the default.
+        Further options of `hicp_lib.detectors.onnx.person_boxes.PersonBoxes`, or of NanoDet; None means the
+        default.
     """
 
     def __init__(
@@ -68,6 +68,6 @@ class BoxSource:
         return boxes_px, np.ones(len(boxes_px))
 
     def describe(self) -> list[Fact]:
-        """What is taken for granted about the boxes."""
+        """What is assumed about the boxes."""
         row = Fact("boxes", self.kind, _MEANINGS[self.kind])
         return [row, *(self._finder.describe() if self._finder else [])]

@@ -1,8 +1,8 @@
 """From a top-down network's output to positions and scores; plain NumPy, all people at once.
 
-Positions are in cells of the output's own grid (or SimCC's bins), cell centres at integers, as
-these networks are trained: cell i stands for the input pixel stride * i. A keypoint whose
-score is not a positive number is not given: NaN with score 0.
+Positions are in cells of the output's own grid (or SimCC's bins), cell centres at integers, as these networks
+are trained: cell i stands for the input pixel stride * i. A keypoint whose score is not a positive number is
+missing: NaN with score 0.
 """
 
 from collections.abc import Callable
@@ -33,8 +33,8 @@ def peaks(maps: np.ndarray) -> Decoded:
 def decode_quarter(maps: np.ndarray, *, needs_both_axes: bool = False) -> Decoded:
     """Heat maps (n, k, h, w): the highest cell, moved a quarter cell towards its higher neighbour.
 
-    (Newell et al., "Stacked hourglass networks", ECCV 2016.) Near the border a cell stays: MMPose
-    decides so axis by axis, AlphaPose (`needs_both_axes`) moves along both or none.
+    (Newell et al., "Stacked hourglass networks", ECCV 2016.) Near the border a cell is not moved: MMPose
+    decides this axis by axis, AlphaPose (`needs_both_axes`) moves along both axes or none.
     """
     cells, scores = peaks(maps)
     width, height = maps.shape[3], maps.shape[2]
@@ -74,8 +74,8 @@ def decode_dark(maps: np.ndarray, kernel: int = 11) -> Decoded:
 def decode_dark_udp(maps: np.ndarray, kernel: int = 11) -> Decoded:
     """Heat maps (n, k, h, w) of a network trained with unbiased data processing, as MMPose decodes them.
 
-    As `decode_dark`, with differences of neighbouring cells, values from 0.001 to 50, and borders that
-    repeat instead of cells that stay.
+    As `decode_dark`, with differences of neighbouring cells, values from 0.001 to 50, and repeated borders
+    instead of unmoved cells.
     """
     cells, scores = peaks(maps)
     log = _log_around(maps, cells, scores, kernel, 1e-3, 50.0)
@@ -139,13 +139,13 @@ def decode_roi_maps(maps: np.ndarray, boxes_px: np.ndarray) -> Decoded:
 
 
 def given(positions: np.ndarray, scores: np.ndarray) -> Decoded:
-    """Positions (n, k, 2) and scores (n, k); NaN and 0 where a score is not positive, or either no number."""
+    """Positions (n, k, 2) and scores (n, k); NaN and 0 where a score is not positive or either is NaN."""
     is_given = (scores > 0) & np.isfinite(scores) & np.isfinite(positions).all(axis=-1)
     return np.where(is_given[..., None], positions, np.nan), np.where(is_given, scores, 0.0)
 
 
 def _around(maps: np.ndarray, cells: np.ndarray) -> Callable[[int, int], np.ndarray]:
-    """Values of maps (n, k, h, w) beside one cell of each; the border's value beyond the border."""
+    """Values of maps (n, k, h, w) next to one cell of each; the border's value beyond the border."""
     rows, (x, y) = np.ogrid[: maps.shape[0], : maps.shape[1]], np.moveaxis(cells.astype(int), -1, 0)
 
     def at(dx: int, dy: int) -> np.ndarray:
@@ -158,8 +158,8 @@ def _around(maps: np.ndarray, cells: np.ndarray) -> Callable[[int, int], np.ndar
 def _log_around(
     maps: np.ndarray, cells: np.ndarray, scores: np.ndarray, kernel: int, least: float, most: float
 ) -> Callable[[int, int], np.ndarray]:
-    """Logarithms of the blurred maps beside a cell of each, for values cut to [least, most]."""
-    # The factor keeps the maximum; it matters only to what is cut.
+    """Logarithms of the blurred maps next to a cell of each, for values clipped to [least, most]."""
+    # The factor keeps the maximum; it only affects clipping.
     blurred = _blur(maps, kernel)
     factor = scores / np.maximum(blurred.max(axis=(2, 3)), np.finfo(np.float32).tiny)
     neighbours = _around(blurred, cells)
@@ -167,7 +167,7 @@ def _log_around(
 
 
 def _newton_step(gradient: np.ndarray, dxx: np.ndarray, dyy: np.ndarray, dxy: np.ndarray) -> np.ndarray:
-    """From a cell to the extremum that its derivatives tell of; none where they tell of none."""
+    """Newton step from a cell to the extremum by its derivatives; zero if there is none."""
     determinant = dxx * dyy - dxy**2
     x, y = gradient[..., 0], gradient[..., 1]
     step = np.stack([dxy * y - dyy * x, dxy * x - dxx * y], axis=-1)

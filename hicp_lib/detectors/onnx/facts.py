@@ -1,4 +1,4 @@
-"""What a detector takes for granted about a model file, and what the others take, for people to read."""
+"""Readable lists of what a detector assumes about a model file."""
 
 from typing import Any, NamedTuple
 
@@ -7,7 +7,7 @@ from hicp_lib.core.files import read_json
 
 TEXTS = read_json(DATA_DIR / "model_facts.json")
 KNOWN_NETWORKS = ", ".join(TEXTS["networks"])
-"""The networks that the detectors take, in one line."""
+"""The networks that the detectors accept, in one line."""
 
 
 class Fact(NamedTuple):
@@ -17,7 +17,7 @@ class Fact(NamedTuple):
     ----------
     what, value : str
     why : str
-        How the value is known.
+        How the value was determined.
     """
 
     what: str
@@ -26,14 +26,14 @@ class Fact(NamedTuple):
 
 
 def facts(name: str, **values: Any) -> list[Fact]:
-    """What is taken for granted about one kind of networks.
+    """The assumptions about one kind of network.
 
     Parameters
     ----------
     name : str
         Key of `facts` in `data/model_facts.json`.
     **values : object
-        What stands there in braces.
+        Values for the placeholders in braces.
 
     Examples
     --------

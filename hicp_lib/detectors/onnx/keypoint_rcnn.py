@@ -1,13 +1,13 @@
 """Keypoint R-CNN (He et al., "Mask R-CNN", ICCV 2017) exported from Detectron2 or torchvision.
 
-One network finds people and their 17 COCO keypoints. The two programs differ in what goes in and
-in what a keypoint's score is:
+One network finds people and their 17 COCO keypoints. The two programs differ in the input and in the meaning
+of a keypoint's score:
 
 - Detectron2 takes BGR 0-255 with the short side at 800 (the long one at most 1333), measures
-  positions with pixel *corners* at integers (half a pixel is taken off here), and scores a
-  keypoint by the softmax mass of its peak over the 56 x 56 map: small numbers, cut off at 1.
-- torchvision takes RGB 0-1 and scales it itself; the score is the raw logit of the peak, made
-  a number in [0, 1] here by a logistic curve with its middle at 2, where Detectron draws points.
+  positions with pixel *corners* at integers (half a pixel is subtracted here), and scores a
+  keypoint by the softmax mass of its peak over the 56 x 56 map: small numbers, clipped at 1.
+- torchvision takes RGB 0-1 and scales it itself; the score is the raw logit of the peak, mapped to [0, 1]
+  here by a logistic curve centred at 2, the value from which Detectron draws points.
 """
 
 from pathlib import Path
@@ -30,7 +30,7 @@ _MAX_EXPONENT = 80.0  # exp() of more is no number
 # What comes out of the network, by shape behind the number of people; None stands for any size.
 _ROLES: dict[str, tuple[int | None, ...]] = {"boxes": (4,), "scores": (), "logits": (_N_KEYPOINTS,)}
 _ROLES |= {"keypoints": (_N_KEYPOINTS, 3), "maps": (_N_KEYPOINTS, None, None)}
-# What fills a fixed input beside the image: the mean colour, 0 once the network has normalised it.
+# Padding of a fixed input: the mean colour, which becomes 0 when the network normalises it.
 _FILL = (124, 116, 104)
 
 
@@ -42,9 +42,9 @@ class KeypointRcnn:
     model : str or Path
         ONNX export of Detectron2's or torchvision's Keypoint R-CNN.
     family : str, optional
-        "detectron2" or "torchvision"; told by the number of outputs' keypoint scores if None.
+        "detectron2" or "torchvision"; detected from the outputs if None.
     min_score : float
-        Least box score of a person.
+        Minimum box score of a person.
     provider : str
     threads : int
         See `hicp_lib.detectors.onnx.session.open_model`.
@@ -85,8 +85,8 @@ class KeypointRcnn:
         return Detections.of_parts(*given(positions_px, scores), people["scores"], "coco17")
 
     def describe(self) -> list[Fact]:
-        """What is taken for granted about the model."""
-        told = "told by its outputs" if self._is_told else "given"
+        """What is assumed about the model."""
+        told = "from its outputs" if self._is_told else "given"
         height, width = (side or "any" for side in self._model.inputs[0].shape[-2:])
         size = {"width": width, "height": height}
         own = facts(self._family, told=told, logit_middle=_LOGIT_MIDDLE, **size, **self.settings)
@@ -111,7 +111,7 @@ class KeypointRcnn:
         return feed if len(self._model.inputs[0].shape) == 4 else feed[0]
 
     def _roles(self, outputs: list[np.ndarray]) -> dict[str, np.ndarray]:
-        """What is there of `_ROLES`; exports differ in order and names, ranks and sizes tell them apart."""
+        """The outputs by `_ROLES`; exports differ in order and names, so ranks and sizes identify them."""
         floats = [output.astype(float) for output in outputs if output.dtype.kind == "f"]
         fitting = {name: [one for one in floats if _fits(one.shape, tail)] for name, tail in _ROLES.items()}
         roles = {name: found[0] for name, found in fitting.items() if found}
@@ -121,11 +121,11 @@ class KeypointRcnn:
         return roles
 
     def _check(self, shapes: list[tuple[int | None, ...]], outputs: list[np.ndarray] | None = None) -> None:
-        """Refuse a network whose outputs cannot be those of its family; an open size may be any."""
+        """Refuse a network whose outputs cannot be those of its family; an open size matches any."""
         found = {name for name, tail in _ROLES.items() if any(_fits(shape, tail) for shape in shapes)}
         is_torch = self._family == "torchvision"
         wanted = [{"keypoints", "logits"}] if is_torch else [{"keypoints"}, {"maps"}]
-        # A file need not tell a port's rank.
+        # A file may leave a port's rank open.
         if () not in shapes and not any(points | {"boxes", "scores"} <= found for points in wanted):
             expected = f"expected {self._family}'s boxes (n, 4), scores (n), keypoints (n, 17, 3)"
             raise self._model.refusal(expected + is_torch * " and keypoint scores (n, 17)", outputs)

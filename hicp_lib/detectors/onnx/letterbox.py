@@ -1,4 +1,4 @@
-"""Images fitted into a detector's input: aspect kept, top-left, the rest filled."""
+"""Fit images into a detector's input: aspect ratio kept, the rest padded."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ IMAGENET_BGR = IMAGENET_RGB[0][::-1], IMAGENET_RGB[1][::-1]
 
 @dataclass(frozen=True)
 class Letterbox:
-    """An image as a detector takes it, and the way back.
+    """An image scaled for a detector's input, and the transform back.
 
     Attributes
     ----------
@@ -21,9 +21,9 @@ class Letterbox:
     scale : array, shape (2,)
         Input pixels per image pixel along x and y.
     corner_px : tuple of float
-        Where the image's own (`origin_px`, `origin_px`) lies in the input, x and y.
+        Position in the input, x and y, of the image's point (`origin_px`, `origin_px`).
     origin_px : float
-        -0.5 where the pixels' corners fall on each other, 0 where the first pixels' centres do.
+        -0.5 if the corners of the first pixels coincide, 0 if their centres do.
     """
 
     pixels: np.ndarray
@@ -47,9 +47,9 @@ def letterbox(
     size_px : tuple of int
         Width and height of the input.
     fill : tuple of int
-        Colour of the rest.
+        Colour of the padding.
     is_centred : bool
-        In the middle of the input, as YOLO-pose does.
+        Whether the image is centred in the input, as in YOLO-pose.
 
     Examples
     --------
@@ -72,15 +72,15 @@ def letterbox(
 def blob(
     images: list[np.ndarray], mean: tuple[float, ...], std: tuple[float, ...], is_bgr: bool = False
 ) -> np.ndarray:
-    """What a network is shown of RGB images of one size: (value - mean) / std.
+    """The normalised network input for RGB images of one size: (value - mean) / std.
 
     Parameters
     ----------
     images : list of array, shape (height, width, 3), dtype uint8
     mean, std : tuple of float
-        One of each of the network's channels.
+        One per channel of the network.
     is_bgr : bool
-        Whether the network takes blue first.
+        Whether the network's channels start with blue.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""MMPose's top-down networks on the user's own weights: boxes, one pass per person, one pose each."""
+"""MMPose's top-down networks on the user's own weights: boxes, then one pass and one pose per person."""
 
 from pathlib import Path
 
@@ -16,12 +16,12 @@ from hicp_lib.detectors.onnx.pose_net import PoseNet
 from hicp_lib.detectors.onnx.pose_nms import oks_nms
 from hicp_lib.detectors.onnx.session import OnnxModel, open_model
 
-# RTMW's head enlarges features by shuffling pixels; the other SimCC heads do not. Its scores go up to ten.
+# RTMW's head enlarges features by shuffling pixels; the other SimCC heads do not. Its scores reach about ten.
 _RTMW_OPERATOR, _RTMW_SCALE = "DepthToSpace", 10.0
 # Vision transformers (ViTPose, Sapiens) first cut the crop into patches, and all were trained with UDP;
 # convolutional networks (HRNet, CSPNeXt) look the same with and without.
 _MIN_PATCH_PX = 14
-# Keypoints whose network score is above this count in a person's score.
+# Keypoints with a network score above this are averaged for a person's score.
 _MIN_COUNTED_SCORE = 0.2
 
 
@@ -42,15 +42,15 @@ class MMPose:
         Decode heat maps aware of their distribution (the "dark" configurations).
     udp : bool, optional
         The network was trained with unbiased data processing ("udp" configurations, ViTPose, Sapiens): its
-        transform and decoding; if None, told by the file's metadata `udp` or its patches, else not.
+        transform and decoding; if None, detected from the file's metadata `udp` or its patches, else False.
     flip_test : bool
         Also run the mirrored crops, and average.
     score_scale : float, optional
         Network score that counts as 1; if None, 10 for RTMW's head and 1 otherwise.
     hand : str
-        "left" or "right", what a one-hand network is shown.
+        "left" or "right", the hand that a one-hand network sees.
     input_size_px : list of int, optional
-        Width and height of the crops, where the file leaves them open.
+        Width and height of the crops, if the file leaves them open.
     provider : str
     threads : int
         See `hicp_lib.detectors.onnx.session.open_model`.
@@ -110,8 +110,8 @@ class MMPose:
         return Detections.of_parts(positions_px[keep], scores[keep], person_scores[keep], self._convention)
 
     def describe(self) -> list[Fact]:
-        """What is taken for granted about the model."""
-        transform = "UDP: sizes less one" if self._udp else "classic, not UDP"
+        """What is assumed about the model."""
+        transform = "UDP: sizes minus one" if self._udp else "classic, not UDP"
         how = {"transform": transform, "transform_from": self._udp_from, "least": _MIN_COUNTED_SCORE}
         how["decoding"] = "heat maps, DARK" if self._dark else "heat maps, quarter cell"
         own = facts("mmpose SimCC" if self._net.is_simcc else "mmpose", **how, **self.settings)
@@ -129,12 +129,12 @@ def _told_udp(model: OnnxModel, is_simcc: bool, given: bool | None) -> tuple[boo
         return given, "option udp"
     told = model.told.metadata.get("udp")
     if isinstance(told, bool):
-        return told, "told by its metadata"
+        return told, "from its metadata"
     patch_px = min(model.told.first_convolution[2:], default=0)
     if is_simcc:
-        return False, "told by the outputs"
+        return False, "from the outputs"
     if patch_px >= _MIN_PATCH_PX:
-        return True, f"told by its patches of {patch_px} pixels (ViTPose, Sapiens); option udp"
+        return True, f"from its patches of {patch_px} pixels (ViTPose, Sapiens); option udp"
     return False, "ASSUMED, the file does not tell; -o udp true for networks named udp"
 
 

@@ -1,4 +1,4 @@
-"""What an ONNX file tells of its network before it runs; a file that is not whole is refused."""
+"""Properties of a network that an ONNX file states, read without running it; truncated files are refused."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from onnx import GraphProto, ModelProto, TensorProto
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import json_or_text
 
-# Under this name exporters keep what a network expects, as a JSON object.
+# Under this name exporters store what a network expects, as a JSON object.
 _CONTRACT = "cigpose_meta"
 _MOST_NODES = 20_000  # published networks have up to 5,000
 
 
 @dataclass(frozen=True)
 class ModelFile:
-    """A network as its file tells of it.
+    """Properties of a network according to its file.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class ModelFile:
     first_convolution : tuple of int
         Shape of the first convolution's weights, (out, in, h, w); empty if there is none.
     metadata : dict
-        What its exporter wrote into it, by name; a contract's entries in place of the contract.
+        Its exporter's metadata, by name; a contract is replaced by its entries.
     """
 
     operators: frozenset[str]
@@ -36,7 +36,7 @@ class ModelFile:
 
 
 def read_model(path: Path, content: bytes) -> ModelFile:
-    """Read what an ONNX file tells of its network.
+    """Read the properties of a network from an ONNX file.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def read_model(path: Path, content: bytes) -> ModelFile:
     Raises
     ------
     InputError
-        If it is no ONNX file, keeps weights in a second one, or its contract is no JSON object.
+        If it is not an ONNX file, keeps weights in a second file, or its contract is not a JSON object.
     """
     try:
         model = ModelProto.FromString(content)
@@ -57,7 +57,7 @@ def read_model(path: Path, content: bytes) -> ModelFile:
         ) from None
     if (n := len(model.graph.node)) > _MOST_NODES:
         raise InputError(f"{path}: has {n} nodes; expected a network of up to {_MOST_NODES}")
-    # A second file would be read from wherever the program was started, and its content is in no hash.
+    # A second file would be read relative to the working folder, and no hash would cover its content.
     outside = next(
         (tensor for tensor in _tensors(model) if tensor.data_location or tensor.external_data), None
     )
@@ -74,7 +74,7 @@ def read_model(path: Path, content: bytes) -> ModelFile:
 
 
 def _tensors(message: Message) -> Iterator[TensorProto]:
-    """Every tensor in a message: of graphs, of nodes' attributes, of the graphs within them."""
+    """Every tensor in a message: in graphs, attributes of nodes, and nested graphs."""
     if isinstance(message, TensorProto):
         yield message
         return

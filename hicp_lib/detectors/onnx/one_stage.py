@@ -1,9 +1,9 @@
-"""Networks that find people and their keypoints in one pass over the image, decoded in the file.
+"""Networks that find people and their keypoints in one pass, with the decoding inside the file.
 
-RTMO (Lu et al., "RTMO", CVPR 2024) sees the image in the input's top-left corner, BGR 0-255, and gives boxes
-with scores and keypoints. YOLO-pose (Maji et al., CVPR workshops 2022, as Ultralytics exports it) sees it in
-the middle, RGB 0-1, and gives rows of box, score and keypoints, without suppression (centre and size, one
-column per row) or after it (corners, and the class behind the score). The rest is filled with 114.
+RTMO (Lu et al., "RTMO", CVPR 2024) takes the image in the input's top-left corner, BGR 0-255, and gives boxes
+with scores and keypoints. YOLO-pose (Maji et al., CVPR workshops 2022, as Ultralytics exports it) takes it
+centred, RGB 0-1, and gives rows of box, score and keypoints, without suppression (centre and size, one column
+per row) or after it (corners, and the class behind the score). The padding value is 114.
 """
 
 from pathlib import Path
@@ -30,9 +30,9 @@ class OneStage:
     model : str or Path
         ONNX export with the decoding inside.
     min_score : float
-        Least score of a person.
+        Minimum score of a person.
     max_overlap : float
-        Part of their union that two people's boxes may share.
+        Maximum intersection over union of two people's boxes.
     provider : str
     threads : int
         See `hicp_lib.detectors.onnx.session.open_model`.
@@ -51,7 +51,7 @@ class OneStage:
         self._model = open_model(model, provider, threads)
         self._min_score, self._max_overlap = min_score, max_overlap
         height, width = self._model.image_size_px
-        match self._model.told.metadata.get("imgsz"):  # so Ultralytics calls what it exported for
+        match self._model.told.metadata.get("imgsz"):  # Ultralytics' name of the exported task
             case [int(open_height), int(open_width)]:
                 self._size_px = width or open_width, height or open_height
             case _:
@@ -68,13 +68,13 @@ class OneStage:
         boxes, keypoints = self._read(self._model.run(feed))
         keep = np.flatnonzero(boxes[:, 4] >= self._min_score)
         keep = keep[unsuppressed(boxes[keep, :4], boxes[keep, 4], self._max_overlap)]
-        # Both families count from the corners of the input and of the image, not from pixels' centres.
+        # Both families measure from the corners of the input and of the image, not from pixel centres.
         positions_px = fitted.to_image_px(keypoints[keep, :, :2] - 0.5) + 0.5
         positions_px, scores = given(positions_px, np.clip(np.nan_to_num(keypoints[keep, :, 2]), 0, 1))
         return Detections.of_parts(positions_px, scores, boxes[keep, 4], self._convention)
 
     def describe(self) -> list[Fact]:
-        """What is taken for granted about the model."""
+        """What is assumed about the model."""
         family = "RTMO" if self._is_rtmo else "YOLO-pose"
         own = facts(family, size_px=self._size_px, convention=self._convention, **self.settings)
         return [*self._model.describe(), *own]

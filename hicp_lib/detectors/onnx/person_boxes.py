@@ -1,11 +1,10 @@
-"""Person boxes by YOLOX and RTMDet, for the networks that take one person at a time.
+"""Person boxes by YOLOX and RTMDet, for networks that process one person at a time.
 
-The image is fitted into the input's top-left corner, the rest filled with 114, in BGR order:
-YOLOX takes it as it is (0-255), RTMDet normalised. Exports with non-maximum suppression inside
-return `dets` (x1, y1, x2, y2, score) and mostly `labels`; those without return one row per cell
-of the grids of stride 8, 16 and 32 (Ge et al., "YOLOX", 2021), decoded or not. As in YOLOX's own
-demonstration a box of any class suppresses the lesser ones it overlaps, and boxes may reach beyond
-the image.
+The image is fitted into the input's top-left corner, padded with 114, in BGR order: YOLOX takes values 0-255,
+RTMDet normalised ones. Exports with non-maximum suppression inside return `dets` (x1, y1, x2, y2, score) and
+usually `labels`; those without return one row per cell of the grids of stride 8, 16 and 32 (Ge et al.,
+"YOLOX", 2021), decoded or not. As in YOLOX's own demonstration a box of any class suppresses overlapping
+boxes with lower scores, and boxes may reach beyond the image.
 """
 
 from pathlib import Path
@@ -24,7 +23,7 @@ _PERSON = 0
 # YOLOX begins by folding 2 x 2 pixels into channels.
 _FOLDED_CHANNELS = 12
 DEFAULT_SIDE_PX = 640
-# exp() of more is no size of a box
+# exp() of more is not a plausible size of a box
 _MAX_LOG_SIZE = 20
 # x, y, size and score
 N_BOX = 5
@@ -41,11 +40,11 @@ class PersonBoxes:
     threads : int
         See `hicp_lib.detectors.onnx.session.open_model`.
     family : str, optional
-        "yolox" or "rtmdet"; told by the first convolution if None.
+        "yolox" or "rtmdet"; detected from the first convolution if None.
     min_score : float
-        Least score of a box.
+        Minimum score of a box.
     max_overlap : float
-        Part of their union that two boxes may share, where the export does no suppression itself.
+        Maximum intersection over union of two boxes, if the export does no suppression itself.
     """
 
     def __init__(
@@ -88,7 +87,7 @@ class PersonBoxes:
         return np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1), scores
 
     def describe(self) -> list[Fact]:
-        """What is taken for granted about the model."""
+        """What is assumed about the model."""
         told = "read from the first convolution" if self._is_told else "given"
         boxes = "decoded" if self._is_decoded else "as the network gives them"
         return facts("person models", told=told, size_px=self._size_px, boxes=boxes, **self.settings)
@@ -122,16 +121,16 @@ class PersonBoxes:
 def unsuppressed(
     corners: np.ndarray, scores: np.ndarray, max_overlap: float, side_px: float = 0.0
 ) -> np.ndarray:
-    """Rows of the boxes that remain of those that overlap, best first.
+    """Rows of the boxes that remain after non-maximum suppression, best first.
 
     Parameters
     ----------
     corners : array, shape (n, 4: left, top, right, bottom)
     scores : array, shape (n,)
     max_overlap : float
-        Part of their union that two may share.
+        Maximum intersection over union of two boxes.
     side_px : float
-        What a box is wider and higher than its corners' difference.
+        Added to the difference of the corners for a box's width and height.
 
     Returns
     -------
@@ -156,7 +155,7 @@ def unsuppressed(
 
 
 def _listed(rows: np.ndarray, outputs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners, scores and classes of an export that did its own suppression; people, if not labelled."""
+    """Corners, scores and classes of an export with its own suppression; people, if unlabelled."""
     none = np.full((1, len(rows)), _PERSON)
     labels = next((output for output in outputs if output.shape == (1, len(rows))), none)
     return rows[:, :4].astype(float), rows[:, 4].astype(float), labels[0]

@@ -1,8 +1,8 @@
 """A top-down network: crops of people in, keypoints in the image out.
 
-The size of the input, the number of keypoints and heat maps against SimCC are read from
-the file; what the file cannot tell (colours, decoding) is given. What its metadata says (`input_w`,
-`input_h`, `split_ratio`, alone or in a `cigpose_meta`) is taken, and must be so.
+The size of the input, the number of keypoints, and whether outputs are heat maps or SimCC are read from the
+file; the rest (colours, decoding) has to be given. Metadata (`input_w`, `input_h`, `split_ratio`, alone or in
+a `cigpose_meta`) are used, and must agree with the network.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +20,7 @@ from hicp_lib.detectors.onnx.session import OnnxModel
 
 CONVENTIONS = {14: "crowdpose14", 17: "coco17", 21: "right_hand21", 26: "halpe26", 68: "halpe68_noface"}
 CONVENTIONS |= {133: "wholebody133", 136: "halpe136"}
-# Sets that networks are published for and that have no place among Halpe's points.
+# Keypoint sets of published networks that have no counterpart in Halpe.
 _STRANGERS = {15: "MPI's body", 16: "MPII's body", 98: "WFLW's face", 106: "LaPa's face", 308: "Goliath"}
 _MAX_BATCH = 16
 Colour = tuple[float, float, float]
@@ -28,24 +28,24 @@ Decoder = Callable[[np.ndarray], Decoded]
 
 
 class PoseNet:
-    """A top-down network, and what its file does not tell about it.
+    """A top-down network, with the properties that its file does not state.
 
     Parameters
     ----------
     model : OnnxModel
     mean, std : Colour
-        Of the R, G and B values 0-255, taken off and divided by.
+        Of the R, G and B values 0-255: subtracted, and divided by.
     flip_test : bool
         Also run the mirrored crops, and average.
     input_size_px : list of int, optional
-        Width and height of the crops, where neither the file's input nor its metadata tells.
+        Width and height of the crops, if neither the file's input nor its metadata states them.
 
     Attributes
     ----------
     input_size_px : tuple of int
         Width and height of the crops.
     convention : str
-        What its keypoints are, a key of `hicp_lib.core.keypoints.TO_HALPE`.
+        The convention of its keypoints, a key of `hicp_lib.core.keypoints.TO_HALPE`.
     is_simcc : bool
         A vector per axis in place of a heat map.
     answer : list of array
@@ -113,7 +113,7 @@ class PoseNet:
         return [*self.model.describe(), *own]
 
     def _respond(self, crops: list[np.ndarray], udp: bool) -> list[np.ndarray]:
-        """The outputs for n crops, flip test included; n of each."""
+        """The outputs for n crops, including the flip test."""
         n = len(crops)
         if self._flip_test:
             crops = crops + [crop[:, ::-1] for crop in crops]
@@ -132,12 +132,12 @@ class PoseNet:
         return [output[: len(crops)] for output in self._ordered(self.model.run(feed), len(feed))]
 
     def _average(self, straight: np.ndarray, flipped: np.ndarray, axis: int, shifts: bool) -> np.ndarray:
-        """Mean of an output and the one for mirrored crops, with its sides put right."""
+        """Mean of an output and the one for mirrored crops, with sides swapped back."""
         back = flipped[:, self._mirror]
         if axis == 0:
             back = back[..., ::-1]
         if shifts:
-            # A strided map lies half a stride off when mirrored; the originals shift it by a cell.
+            # A strided map is off by half a stride when mirrored; the original programs shift it by a cell.
             back = np.concatenate([back[..., :1], back[..., :-1]], axis=-1)
         return (straight + back) / 2
 
@@ -151,7 +151,7 @@ class PoseNet:
         if is_fine and len(maps) == 1 and not vectors:
             return maps
         if is_fine and len(vectors) in (2, 3) and not maps and len({v.shape[1] for v in vectors}) == 1:
-            # Of three the last is the depth (RTMW3D), which is not asked for.
+            # Of three outputs the last is the depth (RTMW3D), which is not used.
             x, y = vectors[:2]
             if x.shape[2] * height == y.shape[2] * width:
                 return [x, y]
@@ -164,7 +164,7 @@ class PoseNet:
 
 
 def convention_of(model: OnnxModel, n_keypoints: int, outputs: list[np.ndarray] | None = None) -> str:
-    """The set of keypoints that a network gives, by their number.
+    """The keypoint convention of a network, by the number of its keypoints.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def convention_of(model: OnnxModel, n_keypoints: int, outputs: list[np.ndarray] 
     Raises
     ------
     InputError
-        If it is none that has its place among Halpe's points.
+        If it is not a convention with a mapping to Halpe.
     """
     if n_keypoints not in CONVENTIONS:
         name = f" ({_STRANGERS[n_keypoints]})" if n_keypoints in _STRANGERS else ""
@@ -185,13 +185,13 @@ def convention_of(model: OnnxModel, n_keypoints: int, outputs: list[np.ndarray] 
 
 
 def _input_size(model: OnnxModel, given: list[int] | None) -> tuple[tuple[int, int], str]:
-    """Width and height of a network's crops, and how they are known."""
+    """Width and height of a network's crops, and where they come from."""
     shape = model.inputs[0].shape
     if len(shape) != 4 or shape[1] not in (None, 3):
         raise model.refusal("expected crops of a fixed size, (n, 3, h, w)")
     read, metadata = (shape[3], shape[2]), model.told.metadata
     told = [metadata.get("input_w"), metadata.get("input_h")]
-    sizes = {"read from the file": read, "told by its metadata": told, "option input_size_px": given or []}
+    sizes = {"read from the file": read, "from its metadata": told, "option input_size_px": given or []}
     whole = {why: size for why, sides in sizes.items() if (size := _size(sides)) is not None}
     if given is not None and "option input_size_px" not in whole:
         raise InputError(f"input_size_px {given}: expected width and height in pixels, as in [192, 256]")
@@ -207,7 +207,7 @@ def _input_size(model: OnnxModel, given: list[int] | None) -> tuple[tuple[int, i
 
 
 def _size(sides: Sequence[Any]) -> tuple[int, int] | None:
-    """Width and height, if that is what is given."""
+    """Width and height, if the value is valid."""
     match sides:
         case [int(width), int(height)] if min(width, height) > 0:
             return width, height

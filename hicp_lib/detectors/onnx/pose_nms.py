@@ -1,8 +1,8 @@
-"""One pose per person: what top-down programs do when several boxes hold the same person.
+"""Pose non-maximum suppression: what top-down programs do when several boxes contain the same person.
 
-MMPose keeps the better of two poses whose OKS is above a limit. AlphaPose compares poses by a
-parametric distance and merges those it takes for one (Fang et al., "RMPE", ICCV 2017; the
-variant for whole bodies and the constants are those of its released program).
+MMPose keeps the better of two poses whose OKS is above a limit. AlphaPose compares poses by a parametric
+distance and merges those that it considers the same (Fang et al., "RMPE", ICCV 2017; the variant for whole
+bodies and the constants are those of its released program).
 """
 
 from dataclasses import dataclass
@@ -25,12 +25,12 @@ def oks_nms(
     sigmas: np.ndarray,
     max_oks: float = 0.9,
 ) -> np.ndarray:
-    """Rows to keep, by falling score: each pose whose OKS with every better one is at most `max_oks`.
+    """Rows to keep, by decreasing score: poses whose OKS with every better one is at most `max_oks`.
 
     Parameters
     ----------
     positions_px : array, shape (n, k, 2)
-        A NaN point agrees with nothing.
+        A NaN point matches nothing.
     person_scores, areas_px2 : array, shape (n,)
     sigmas : array, shape (k,)
     max_oks : float
@@ -62,17 +62,17 @@ class PoseNmsRules:
     Attributes
     ----------
     delta1, delta2 : float
-        Scale of the scores, and of the distances in pixels.
+        Scales of the scores and of the distances in pixels.
     mu : float
-        Weight of the distances against the scores.
+        Weight of the distances relative to the scores.
     gamma : float
         Similarity above which two poses are one person.
     min_score : float
-        A person none of whose points reaches it is dropped.
+        A person whose points are all below it is dropped.
     min_matches : float
         This many coinciding points make two poses one person.
     reach : float
-        How far apart points may lie to coincide, as a part of the box's longer side.
+        Maximum distance of coinciding points, as a fraction of the box's longer side.
     is_whole_body : bool
         Compare body, face and hands each on its own.
     """
@@ -101,7 +101,7 @@ def merge_poses(
     ----------
     positions_px : array, shape (n, k, 2)
     scores : array, shape (n, k)
-        Positions that are not given are NaN, with score 0.
+        Missing positions are NaN, with score 0.
     boxes_px : array, shape (n, 4: x, y, width, height)
     rules : PoseNmsRules
         Constants.

@@ -1,7 +1,7 @@
-"""ONNX model files opened with ONNX Runtime: checked, on the processor that was asked for, shared.
+"""Open ONNX model files with ONNX Runtime: checked, on the requested processor, shared.
 
-A model is opened once per process, however many detectors (one per thread) use it; ONNX
-Runtime allows its sessions to be run from several threads at a time.
+A model is opened once per process and shared by all detectors (one per thread); ONNX Runtime's sessions can
+run in several threads at once.
 """
 
 import math
@@ -50,13 +50,13 @@ class OnnxModel:
     ----------
     path : Path
     sha256 : str
-        The file, and the hash of the model in it or made from it.
+        The file, and the hash of its content.
     provider : str
         Where it runs, e.g. "cpu".
     inputs, outputs : list of Port
         Its ports.
     told : ModelFile
-        What its file tells.
+        Properties read from its file.
     """
 
     def __init__(self, path: Path, content: bytes, provider: str, threads: int, is_ours: bool) -> None:
@@ -79,7 +79,7 @@ class OnnxModel:
 
     @property
     def image_size_px(self) -> tuple[int | None, int | None]:
-        """Height and width of the one image it takes; None where the model leaves them open.
+        """Height and width of its single input image; None where the model leaves them open.
 
         Raises
         ------
@@ -93,7 +93,7 @@ class OnnxModel:
 
     @property
     def side_px(self) -> int:
-        """Side of the one image it takes, a square of a fixed size.
+        """Side of its single input image, a square of a fixed size.
 
         Raises
         ------
@@ -106,13 +106,13 @@ class OnnxModel:
         return height
 
     def refusal(self, why: str, outputs: list[np.ndarray] | None = None) -> InputError:
-        """What to raise for a network that is not the one wanted: what was found, why not, what is known.
+        """The error for an unsupported network: what it is, why it is refused, what is supported.
 
         Parameters
         ----------
         why : str
         outputs : list of array, optional
-            What it gave, where that tells more than the file.
+            Its actual outputs, if they tell more than the file.
         """
         shapes = [port.shape for port in self.outputs] if outputs is None else [out.shape for out in outputs]
         gives = [f"{port.name} {_text(shape)}" for port, shape in zip(self.outputs, shapes, strict=True)]
@@ -154,7 +154,7 @@ class OnnxModel:
         return dict(zip((port.name for port in self.outputs), self.run(pixels), strict=True))
 
     def response_to_zeros(self, *size_px: int) -> list[np.ndarray]:
-        """The outputs for an input of zeros: their shapes, and what the network says of nobody.
+        """The outputs for an input of zeros: their shapes, and the response to an empty image.
 
         Parameters
         ----------
@@ -176,7 +176,7 @@ _lock = threading.Lock()
 
 
 def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> OnnxModel:
-    """Open an ONNX file, or hand out the model this process has open already.
+    """Open an ONNX file, or return the model if this process has it open already.
 
     Parameters
     ----------
@@ -185,13 +185,13 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
     provider : str
         Execution provider by its short name: cpu, cuda, tensorrt, openvino, ...
     threads : int
-        Of one inference; images run side by side already, so more rarely helps.
+        Threads of one inference; images already run in parallel, so more rarely help.
 
     Raises
     ------
     InputError
-        If the file is absent, not a network ONNX Runtime can run or, if it was fetched by name, not the one
-        that was recorded then, takes too much time or memory, or the provider is not to be had.
+        If the file is absent, not a network that ONNX Runtime can run, differs from the one recorded when it
+        was fetched by name, takes too much time or memory, or the provider is not available.
     """
     path = Path(path)
     content = read_bytes(path, "give the path of an ONNX file")
@@ -200,7 +200,7 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
 
 
 def _opened(content: bytes, path: Path, provider: str, threads: int, is_ours: bool) -> OnnxModel:
-    """A model of this content; networks that do not come with the library are tried before."""
+    """The model with this content; networks that do not come with the library are tried out first."""
     if provider not in available_providers():
         raise InputError(
             f"{path}: execution provider {provider!r} is not available here; expected one of: "
@@ -215,7 +215,7 @@ def _opened(content: bytes, path: Path, provider: str, threads: int, is_ours: bo
 
 
 def open_committed(name: str, provider: str = "cpu", threads: int = 1) -> OnnxModel:
-    """As `open_model`, one of the networks that come with the library.
+    """As `open_model`, for a network that comes with the library.
 
     Parameters
     ----------

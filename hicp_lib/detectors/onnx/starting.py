@@ -1,7 +1,7 @@
-"""ONNX Runtime started on a network; on a stranger's first in a process whose time and memory are limited.
+"""Start ONNX Runtime on a network; on an untrusted one first in a process with limited time and memory.
 
-A network is a program: it can ask for any memory, or never end, when it is run and when it is opened already,
-since what depends on no input is computed then.
+A network is a program: it can use any amount of memory, or never end, both when it is run and when it is
+opened, since constant parts are computed at that time.
 """
 
 from pathlib import Path
@@ -12,8 +12,8 @@ from hicp_lib.core.environment import with_variables
 from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.limited import limited_child
 
-# ONNX Runtime would tell its vendor of every model that is opened, and keep an identifier for that in the
-# user's cache folder. It reads the variable once, when it is loaded.
+# ONNX Runtime would report every opened model to its vendor, and store an identifier for that in the user's
+# cache folder. It reads this variable once, when it is loaded.
 with with_variables(ORT_DISABLE_TELEMETRY="1"):
     import onnxruntime
 
@@ -22,13 +22,13 @@ DTYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
 
 
 def available_providers() -> dict[str, str]:
-    """Execution providers of this onnxruntime that compute on this machine, full names by short ones."""
+    """Execution providers of this onnxruntime for local computation, full names by short ones."""
     found = onnxruntime.get_available_providers()
     return {name.removesuffix("ExecutionProvider").lower(): name for name in found if "Azure" not in name}
 
 
 def start(path: Path, content: bytes, provider: str, threads: int) -> onnxruntime.InferenceSession:
-    """A session on a network that is trusted, or was tried.
+    """A session on a network that is trusted, or was tried out.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def start(path: Path, content: bytes, provider: str, threads: int) -> onnxruntim
     Raises
     ------
     InputError
-        If ONNX Runtime cannot run it, or not there.
+        If ONNX Runtime cannot run it, or not on this provider.
     """
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
@@ -66,9 +66,9 @@ def start(path: Path, content: bytes, provider: str, threads: int) -> onnxruntim
 
 
 def try_out(path: Path) -> None:
-    """Refuse a network that takes more time or memory than a file of its size may, or ends its process.
+    """Refuse a network that takes more time or memory than allowed for its file's size, or crashes.
 
-    What else is wrong with it is not told here.
+    Other faults are not reported here.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def _open_and_run(path: str) -> None:
 
 
 def _sizes(shape: list[int | str | None]) -> list[int]:
-    """Sizes of an input: what is open is one image of 256 pixels a side."""
+    """Shape of a test input: open axes are one image of 256 x 256 pixels."""
     one_image = [1, 3, 256, 256][-len(shape) :]
     sizes = (size if isinstance(size, int) else 0 for size in shape)
     return [size if size > 0 else one for size, one in zip(sizes, one_image, strict=True)]

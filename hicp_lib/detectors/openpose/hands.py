@@ -1,8 +1,8 @@
-"""OpenPose's hand network on the user's weights, at the arms of the people found.
+"""OpenPose's hand network on the user's weights, run at the arms of detected people.
 
-A hand is looked for in a square around the point a third of the forearm beyond the wrist (Simon et al.,
-"Hand keypoint detection in single images using multiview bootstrapping", CVPR 2017), the left one
-mirrored: the network knows right hands.
+A hand is searched for in a square around the point a third of the forearm beyond the wrist (Simon et al.,
+"Hand keypoint detection in single images using multiview bootstrapping", CVPR 2017), mirrored for left hands,
+since the network is trained on right hands.
 """
 
 from pathlib import Path
@@ -18,7 +18,7 @@ from hicp_lib.detectors.openpose.net_input import feed
 from hicp_lib.detectors.openpose.released import enlarge
 
 _HAND_SIDE_PX, _N_HAND, _MIN_ARM_SCORE = 368, 21, 0.03
-# Where a hand's square lies and how large it is, in lengths of the forearm; smaller ones are not looked at.
+# Position and size of a hand's square, in lengths of the forearm; smaller squares are skipped.
 _BEYOND_WRIST, _SQUARE_SIDE, _FOREARMS_PER_UPPER_ARM, _MIN_AREA_PX2 = 0.33, 1.5, 0.9, 10.0
 _HANDS = {"left": LEFT_HAND, "right": RIGHT_HAND}
 
@@ -36,7 +36,7 @@ class OpenPoseHands:
         self._maps(self._model.response_to_zeros(self._side_px, self._side_px))
 
     def complete(self, image: np.ndarray, people: Detections) -> Detections:
-        """The people with the hands found at their arms; none where shoulder, elbow or wrist is missing."""
+        """The people with the hands found at their arms; arms without shoulder, elbow or wrist get none."""
         keypoints_px, scores = people.keypoints_px.copy(), people.scores.copy()
         for person in range(len(people)):
             for side, indices in _HANDS.items():
@@ -59,7 +59,7 @@ class OpenPoseHands:
             Top left of the square.
         side_px : float
         is_left : bool
-            Show it mirrored.
+            Whether to mirror it.
 
         Returns
         -------
@@ -87,7 +87,7 @@ class OpenPoseHands:
 
 
 def hand_square(keypoints_px: np.ndarray, scores: np.ndarray, side: str) -> tuple[np.ndarray, float] | None:
-    """The square in which OpenPose looks for a hand of a person, if it does.
+    """The square in which OpenPose searches for a hand of a person, or None.
 
     Parameters
     ----------

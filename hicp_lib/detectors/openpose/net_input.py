@@ -1,26 +1,26 @@
-"""What OpenPose's own networks are shown: BGR, value / 256 - 0.5, aspect kept."""
+"""Input of OpenPose's own networks: BGR, value / 256 - 0.5, aspect ratio kept."""
 
 import cv2
 import numpy as np
 
 from hicp_lib.detectors.onnx.letterbox import Letterbox
 
-# Wider images are shown smaller, the rest of the height black.
+# Wider images are scaled down, and the height padded with black.
 _MAX_ASPECT = 16 / 9
 
 
 def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> Letterbox:
-    """An image as OpenPose's program fits it into its network's input: aspect kept, black right and below.
+    """Fit an image into the input like OpenPose's program: aspect ratio kept, black right and below.
 
-    The width is the image's in proportion, to a multiple of 16 and at most 16 / 9 of the height; first
-    and last pixels' centres fall on each other, and positions go back by the pixels the image covers.
+    The width follows the image's aspect ratio, rounded to a multiple of 16 and at most 16 / 9 of the height.
+    The centres of the first and last pixels coincide.
 
     Parameters
     ----------
     image : array, shape (height, width, 3), dtype uint8
     height_px : int
     width_px : int, optional
-        Where the network takes no other.
+        If the network accepts no other.
 
     Examples
     --------

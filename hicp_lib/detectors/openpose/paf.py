@@ -5,10 +5,11 @@ affinity fields", TPAMI 2021) and the defaults of its released program. Plain Nu
 `PartModel`; positions are in pixels of the network's input, pixel centres at integers, where
 cell i of a map with stride s covers pixels s i ... s i + s - 1.
 
-Two deliberate differences, which `paf_released` does not have: OpenPose enlarges the maps to input size
-and takes a centroid around each maximum. Here the maximum is found in the map itself and refined with
-the parabola through the logarithms of its neighbours, exact for the Gaussians the maps are trained on and
-cheaper. And two people are merged when a limb joins them and they have no part in common.
+It differs from OpenPose in two ways, on purpose (`hicp_lib.detectors.openpose.released` does not). OpenPose
+enlarges the maps to input size and takes a centroid around each maximum; here the maximum is found in the map
+itself and refined with the parabola through the logarithms of its neighbours, which is exact for the
+Gaussians that the maps are trained on, and cheaper. And two people are merged when a limb joins them and they
+have no part in common.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class PartModel:
     convention : str
         Key of `hicp_lib.core.keypoints.TO_HALPE` for its parts.
     n_parts : int
-        Number of heat maps used (the background map is not).
+        Number of heat maps used (without the background map).
     pairs : array, shape (n_pairs, 2)
         Parts (from, to) of each limb, in the order they are connected.
     fields : array, shape (n_pairs, 2)
@@ -40,7 +41,7 @@ class PartModel:
     completing : frozenset of int
         Limbs that may complete a person but never start one (ear to shoulder).
     uncounted : frozenset of int
-        Parts that do not count towards the fewest parts of a person.
+        Parts that do not count towards the minimum number of parts of a person.
     """
 
     convention: str
@@ -52,7 +53,7 @@ class PartModel:
 
     @classmethod
     def of(cls, convention: str) -> PartModel:
-        """That of one of OpenPose's networks, by the name of its keypoints (`data/keypoints.json`)."""
+        """The model of one of OpenPose's networks, by the name of its keypoints (`data/keypoints.json`)."""
         row = read_json(DATA_DIR / "keypoints.json")["openpose_parts"][convention]
         pairs, fields = np.array(row["pairs"]), np.array(row["fields"])
         completing, uncounted = frozenset(row["completing"]), frozenset(row["uncounted"])
@@ -66,15 +67,15 @@ class PafOptions:
     Attributes
     ----------
     min_peak : float
-        Least heat map value of a part.
+        Minimum heat map value of a part.
     min_sample : float
-        Least projection of the field onto the limb for a sample to agree.
+        Minimum projection of the field onto the limb for a sample to agree.
     min_agreement : float
-        Least fraction of samples that agree.
+        Minimum fraction of samples that agree.
     min_parts : int
-        Fewest parts of a person.
+        Minimum number of parts of a person.
     min_score : float
-        Least (sum of part and limb scores) / (number of parts) of a person.
+        Minimum of (sum of part and limb scores) / (number of parts) of a person.
     """
 
     min_peak: float = 0.05
@@ -86,7 +87,7 @@ class PafOptions:
 
 @dataclass
 class Person:
-    """Peaks of one person by part, the sum of the scores that count (here of limbs) and their number."""
+    """Peaks of one person by part, the sum of the counted scores (here of limbs) and their number."""
 
     peaks: dict[int, int] = field(default_factory=dict)
     score: float = 0.0
@@ -108,7 +109,7 @@ _SIDE_OVER_SHORT_LIMB = 150
 
 
 def find_peaks(heat_maps: np.ndarray, stride: int, min_peak: float) -> list[np.ndarray]:
-    """Local maxima of each heat map, the highest `MAX_PEAKS` of them by falling value.
+    """Local maxima of each heat map, at most `MAX_PEAKS`, by decreasing value.
 
     Parameters
     ----------
@@ -116,7 +117,7 @@ def find_peaks(heat_maps: np.ndarray, stride: int, min_peak: float) -> list[np.n
     stride : int
         Input pixels per cell.
     min_peak : float
-        Least value.
+        Minimum value.
 
     Returns
     -------
@@ -142,7 +143,7 @@ _BEFORE = np.array([[1, 1, 1], [1, 0, 0], [0, 0, 0]], np.uint8)  # a cell's neig
 
 
 def _is_maximum(maps: np.ndarray) -> np.ndarray:
-    """Cells above their eight neighbours; of a plateau of equals, one remains."""
+    """Cells above their eight neighbours; of a plateau of equal cells, one remains."""
     before, after = (np.stack([cv2.dilate(one, of) for one in maps]) for of in (_BEFORE, _BEFORE[::-1, ::-1]))
     return (maps > before) & (maps >= after)
 
@@ -180,7 +181,7 @@ def limb_scores(
     options : PafOptions
         Thresholds.
     sample : callable, optional
-        How the field is read between cells; bilinearly if None.
+        How the field is interpolated between cells; bilinearly if None.
 
     Returns
     -------
@@ -200,7 +201,7 @@ def limb_scores(
     agree = taken & (projected > options.min_sample)
     count = agree.sum(axis=-1)
     mean = np.where(agree, projected, 0).sum(axis=-1) / np.maximum(count, 1)
-    # Points nearly on top of each other leave the field no room; OpenPose lets them just pass.
+    # For nearly coinciding points the field has no samples; OpenPose lets them just pass.
     short_px = np.sqrt(limb_field[0].size) * stride / _SIDE_OVER_SHORT_LIMB
     is_short = (length > _LEAST_LENGTH_PX) & (length < short_px)
     weak = np.where(is_short, options.min_peak + _LEAST_SCORE, 0.0)
@@ -220,7 +221,7 @@ def _sample(maps: np.ndarray, positions_px: np.ndarray, stride: int) -> np.ndarr
 
 
 def connect(scores: np.ndarray) -> list[Limb]:
-    """Limbs taken greedily by falling score, of equal ones the last first; each end used once."""
+    """Limbs chosen greedily by decreasing score, of equal ones the last first; each end is used once."""
     limbs, free_start, free_end = [], set(range(scores.shape[0])), set(range(scores.shape[1]))
     for flat in np.argsort(scores, axis=None, kind="stable")[::-1]:
         start, end = divmod(int(flat), scores.shape[1])

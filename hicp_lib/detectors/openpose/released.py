@@ -1,27 +1,27 @@
-"""Peaks and affinity fields as OpenPose's released program reads them.
+"""Peaks and affinity fields as OpenPose's released program evaluates them.
 
-The maps are enlarged to the size of the network's input; a peak is the centroid of the positive
-values within 3 pixels of a local maximum, and fields are read at the nearest pixel. `paf` finds
-peaks in the small maps, which is far cheaper and as good; this is for the original networks,
-whose results should be the program's (constants and rules: its `net` folder, version 1.7).
+The maps are enlarged to the size of the network's input; a peak is the centroid of the positive values within
+3 pixels of a local maximum, and fields are read at the nearest pixel. `paf` finds peaks in the small maps,
+which is far cheaper and as good; this module is for the original networks, whose results should equal the
+program's (constants and rules: its `net` folder, version 1.7).
 
-The program counts image pixels from their corners: it adds half an image pixel to a peak before it
-reads the fields, and leaves it in its results. The fields are read there, too (`offset_px`); positions
-given have pixel centres at integers, as everywhere here.
+The program measures image pixels from their corners: it adds half an image pixel to a peak before it reads
+the fields, and keeps it in its results. Here the fields are read at the same places (`offset_px`), but
+results have pixel centres at integers, as everywhere in this library.
 
 `join_as_released` goes from limbs to people as that program does (the build for processors, version 1.7).
-Its rules, followed to the letter where they look odd, too, since the program's people are wanted:
+Its rules are followed exactly, even where they look odd, to get the same people:
 
-- A part without any partner in the image is a person of one part until a limb takes it up.
-- A limb goes to the first person who has its first end, and overwrites who was at its second; otherwise it
-  begins a person. People are never merged. (The build for graphics cards, which sorts the limbs of all
-  kinds together, merges.)
-- Limbs from shoulder to ear complete people and begin none; neither their scores nor their parts count.
-- A person's score is the sum of its parts' and limbs' over the number of parts and limbs there could be.
-- Feet do not count towards the fewest parts, and who has feet needs more than four other parts; if nobody
-  is left, that is waived.
+- A part without any partner in the image is a person of one part until a limb includes it.
+- A limb is added to the first person who has its first end, and overwrites that person's part at its second
+  end; otherwise it starts a new person. People are never merged. (The build for graphics cards, which sorts
+  the limbs of all kinds together, merges.)
+- Limbs from shoulder to ear complete people but start none; neither their scores nor their parts count.
+- A person's score is the sum over its parts and limbs, divided by their possible number.
+- Feet do not count towards the minimum number of parts, and a person with feet needs more than four other
+  parts; if nobody is left, this rule is dropped.
 
-`hicp_lib.detectors.openpose.paf` joins by its own, simpler rules.
+`hicp_lib.detectors.openpose.paf` uses its own, simpler rules.
 """
 
 from functools import partial
@@ -61,7 +61,7 @@ def assemble_released(
     parts : array, shape (n_people, n_parts, 3)
         x, y in input pixels, score; NaN, NaN, 0 if missing.
     scores : array, shape (n_people,)
-        The program's, see `hicp_lib.detectors.openpose.released.join_as_released`.
+        As in the program, see `hicp_lib.detectors.openpose.released.join_as_released`.
     """
     heat_maps, fields = enlarge(heat_maps, stride), enlarge(fields, stride)
     peaks = [centroid_peaks(heat_map, options.min_peak) for heat_map in heat_maps]
@@ -79,11 +79,11 @@ def enlarge(maps: np.ndarray, factor: int) -> np.ndarray:
 def centroid_peaks(heat_map: np.ndarray, min_peak: float) -> np.ndarray:
     """Local maxima of an enlarged map (h, w) above `min_peak`: rows (n, 3) of x, y in pixels and value.
 
-    At the border itself there are none; one pixel inside, where enlarging leaves twins, equal
-    neighbours are allowed.
+    There are none at the border itself; one pixel inside, where enlarging produces pairs of equal values,
+    equal neighbours are allowed.
     """
     height, width = heat_map.shape
-    # Nothing below its neighbours can be a peak: few pixels are left to look at closely.
+    # Pixels below their neighbours cannot be peaks: this leaves few to examine closely.
     highest = cv2.dilate(heat_map, np.ones((3, 3), np.uint8))
     rows, columns = np.nonzero((heat_map > min_peak) & (heat_map >= highest))
     value = heat_map[rows, columns]

@@ -1,8 +1,8 @@
 """OpenPose's own body networks on the user's weights: 18 or 25 parts.
 
-What goes in is BGR, value / 256 - 0.5; what comes out is one heat map per part, one for the
-background, and two affinity fields per limb, at an eighth of the input's size. Peaks, limbs
-and people are read as OpenPose's program does.
+The input is BGR, value / 256 - 0.5; the outputs are one heat map per part, one for the background, and two
+affinity fields per limb, at an eighth of the input's size. Peaks, limbs and people are found as in OpenPose's
+program.
 """
 
 from dataclasses import asdict
@@ -56,7 +56,7 @@ class OpenPose:
         self._model = open_model(model, provider, threads)
         height, width = self._model.image_size_px
         self._size_px = height or net_height_px, width
-        shown_px = self._size_px[0], width or net_height_px  # another network is refused before any image
+        shown_px = self._size_px[0], width or net_height_px  # fail before the first image
         answer = self._model.response_to_zeros(*shown_px)
         self._convention = _split(self._model, answer, shown_px)[2].convention
         self._hands = OpenPoseHands(hand_model, provider, threads) if hand_model is not None else None
@@ -76,7 +76,7 @@ class OpenPose:
         return self._hands.complete(image, people) if self._hands else people
 
     def describe(self) -> list[Fact]:
-        """What is taken for granted about the models."""
+        """What is assumed about the models."""
         height, width = self._size_px
         open_size = "option net_height_px; width in proportion, to a multiple of 16, at most 16 / 9 of it"
         size = {"width": width or "any", "height": height}

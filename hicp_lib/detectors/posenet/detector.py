@@ -1,10 +1,11 @@
-"""PoseNet on MobileNetV1, bottom-up: everybody in a whole image (Papandreou et al., "PersonLab", ECCV 2018).
+"""PoseNet on MobileNetV1, bottom-up: all people in an image (Papandreou et al., "PersonLab", ECCV 2018).
 
-The image is fitted into the middle of the network's square input. `tools/bake_tfjs.py` made its file.
+The image is centred in the network's square input. `tools/bake_tfjs.py` made its file.
 
 The network gives, on a grid of cells, a heat map of each keypoint, the offset from a cell to the keypoint
 near it, and along each edge of the tree the displacement from a parent to its child and back. The highest
-cell that no person has yet is the root of the next one, whose other keypoints are walked to.
+cell not yet assigned is the root of the next person, whose other keypoints are reached along the
+displacements.
 """
 
 import math
@@ -37,9 +38,10 @@ class DecodingRule:
     ----------
     max_people : int
     min_root_score : float
-        Of the cell a person begins at.
+        Minimum score of a person's first cell.
     same_part_px : float
-        A keypoint this near to one of an earlier person's of its kind is that person's, in input pixels.
+        A keypoint this close to an earlier person's keypoint of the same kind belongs to that person, in
+        input pixels.
     """
 
     max_people: int = 5
@@ -49,7 +51,7 @@ class DecodingRule:
 
 @dataclass(frozen=True)
 class Maps:
-    """What the network says of each cell, (h, w) cells that are `STRIDE_PX` apart.
+    """The network's outputs on (h, w) cells that are `STRIDE_PX` apart.
 
     Attributes
     ----------
@@ -79,7 +81,7 @@ class Maps:
 
 
 def decode(maps: Maps, rule: DecodingRule) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """People of the maps, in falling order of their roots' scores.
+    """People in the maps, in decreasing order of their roots' scores.
 
     Parameters
     ----------
@@ -92,7 +94,7 @@ def decode(maps: Maps, rule: DecodingRule) -> tuple[np.ndarray, np.ndarray, np.n
         In input pixels.
     scores : array, shape (n, 17)
     person_scores : array, shape (n,)
-        Sum of the scores of keypoints that no earlier person has, over 17.
+        Sum of the scores of keypoints that no earlier person has, divided by 17.
     """
     people: list[np.ndarray] = []
     person_scores: list[float] = []
@@ -110,7 +112,7 @@ def decode(maps: Maps, rule: DecodingRule) -> tuple[np.ndarray, np.ndarray, np.n
 
 
 def _roots(heat: np.ndarray, least: float) -> np.ndarray:
-    """Part, row and column (n, 3) of cells that none of their eight neighbours exceeds, highest first."""
+    """Part, row and column (n, 3) of cells not exceeded by their eight neighbours, highest first."""
     window = np.ones((3, 3), np.uint8)
     highest = np.stack([cv2.dilate(one, window, borderType=cv2.BORDER_REPLICATE) for one in heat])
     rows = np.argwhere((heat >= least) & (heat >= highest))
@@ -124,7 +126,7 @@ def _is_taken(people: list[np.ndarray], part: int, position_px: Sequence[float],
 def _walk(maps: Maps, root: int, cell: tuple[int, int]) -> np.ndarray:
     """x, y, score (17, 3) of the person with this root: up the tree from it, then down to all others.
 
-    In plain numbers: arrays of two would take most of the decoding's time.
+    With Python floats, since arrays of two would take most of the decoding's time.
     """
     found = {root: (*maps.keypoint(root, cell), float(maps.heat[(root, *cell)]))}
     up = [(edge, child, parent, maps.to_parent_px) for edge, (parent, child) in enumerate(EDGES)]
@@ -141,7 +143,7 @@ def _walk(maps: Maps, root: int, cell: tuple[int, int]) -> np.ndarray:
 
 
 class PoseNetMobileNet:
-    """PoseNet (MobileNetV1): 17 body points of everybody in the image.
+    """PoseNet (MobileNetV1): 17 body points of all people in the image.
 
     Parameters
     ----------
@@ -176,7 +178,7 @@ class PoseNetMobileNet:
         """Run the network on an RGB square of its input's side."""
         blob = cv2.dnn.blobFromImage(square, 1 / 127.5, mean=(127.5, 127.5, 127.5))
         outputs = self._model.run_named(blob)
-        # Of each vector all y come first, then all x.
+        # In the outputs, all y components come first, then all x.
         names = ("displacement_fwd", "displacement_bwd", "offset")
         paired = (outputs[name].reshape(2, -1, *outputs[name].shape[2:]) for name in names)
         to_child, to_parent, offsets = (np.moveaxis(of_both[::-1], 0, -1) for of_both in paired)

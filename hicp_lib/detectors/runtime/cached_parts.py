@@ -1,9 +1,9 @@
-"""A detector as it runs over image files: timed, its parts' answers read from disk where they are kept.
+"""Run a detector over images: timed, with cached results of its parts.
 
-`mediapipe` is made of `mediapipe-pose` and `mediapipe-hands`, a combination of a body and a hand detector;
-variants of a combination look at mostly the same squares of the same images. A part looks at the same image
-or square once, whoever asks: its results for whole images lie where the part alone, run over the same files,
-keeps its own.
+`mediapipe` consists of `mediapipe-pose` and `mediapipe-hands`, a combination of a body and a hand detector;
+variants of a combination run on mostly the same squares of the same images. A part runs on the same image or
+square only once: its results for whole images are shared with those of the part run alone over the same
+files.
 """
 
 import time
@@ -20,17 +20,17 @@ from hicp_lib.detectors.runtime.results import Timed, cache_folder, cached, pixe
 
 @dataclass
 class _Shown:
-    """What a runner's detector is being shown.
+    """The image that a runner's detector is processing.
 
     Attributes
     ----------
     workers : int
-        How many runners work side by side.
+        Number of runners in parallel.
     image : array, shape (height, width, 3), optional
     image_sha256 : str, optional
-        Hash of the file that `image` is from; None if nothing is to be kept.
+        Hash of the file that `image` is from; None if nothing is to be cached.
     owed_ms : list of float
-        For each result of a part, what the part took to find it, less what it took to get it now.
+        For each result of a part, its original time minus the time to get it now.
     """
 
     workers: int
@@ -40,29 +40,29 @@ class _Shown:
 
 
 class Runner:
-    """A detector that is shown one image after another.
+    """A detector that is run on one image after another.
 
     Parameters
     ----------
     detector : Detector
-        What runs. It stays as it is: the runner asks a copy of it, whose `parts`, if it has any, are cached.
+        The detector. It is not changed: the runner uses a copy of it, whose `parts`, if any, are cached.
     workers : int
-        How many such runners work side by side.
+        Number of such runners in parallel.
 
     Raises
     ------
     InputError
-        For a detector whose answers depend on the images before: they come in any order here.
+        For a detector whose results depend on earlier images: here they come in any order.
     """
 
     def __init__(self, detector: Detector, workers: int) -> None:
         if _tracks(detector):
-            raise InputError(f"{detector.name}: tracking_hz is for a video, these images stand by themselves")
+            raise InputError(f"{detector.name}: tracking_hz is for a video, and these images are independent")
         self.detector, self._shown = detector, _Shown(workers)
         self._asked = _with_cached_parts(detector, self._shown)
 
     def detect(self, image: np.ndarray, boxes_px: np.ndarray | None, image_sha256: str | None) -> Timed:
-        """People in an image, and the time it took; of what was kept, the time then.
+        """People in an image, and the time it took; for cached results, the original time.
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class Runner:
         boxes_px : array or None, shape (n, 4: x, y, width, height)
             For detectors that take them.
         image_sha256 : str or None
-            Of the image's file; without it nothing is read from disk or kept there.
+            Of the image's file; without it the cache is not used.
         """
         shown = self._shown
         shown.image, shown.image_sha256 = image, image_sha256
@@ -81,7 +81,7 @@ class Runner:
 
 
 class CachedPart:
-    """A part of a runner's detector: its results come from disk where it saw the same before."""
+    """A part of a runner's detector: results for an input seen before come from the cache."""
 
     def __init__(self, detector: Detector, shown: _Shown) -> None:
         self._detector, self._shown, self._folder = detector, shown, cache_folder(detector)
@@ -111,12 +111,12 @@ class CachedPart:
 
 
 def _tracks(detector: Detector) -> bool:
-    """Whether its settings, or those of a part, say that images are those of a video."""
+    """Whether its settings, or those of a part, ask for tracking in a video."""
     return "tracking_hz" in detector.settings or any(map(_tracks, getattr(detector, "parts", {}).values()))
 
 
 def start(detector: Detector) -> None:
-    """Let a detector that has a `start` start, so that the time of its first call is that of any other."""
+    """Call a detector's `start`, if it has one, so that its first call takes no longer than others."""
     getattr(detector, "start", lambda: None)()
 
 
@@ -128,7 +128,7 @@ def _timed(detector: Detector, workers: int, image: np.ndarray, *boxes_px: np.nd
 
 
 def _with_cached_parts(detector: Detector, shown: _Shown) -> Detector:
-    """A copy of a detector that asks cached parts; the detector itself if it has none."""
+    """A copy of a detector with cached parts; the detector itself if it has none."""
     if not hasattr(detector, "parts"):
         return detector
     result = copy(detector)

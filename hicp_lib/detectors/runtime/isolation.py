@@ -1,9 +1,8 @@
-"""A native library in a process of its own: what it does there is not done to the caller's.
+"""Run a native library in a separate process, so that it cannot affect the caller's.
 
 MediaPipe 1.x writes to descriptor 2, reports usage metrics (no images) to its vendor every minute and
 whenever a task is closed, has no switch for either, and may abort. Its HTTP client obeys the usual proxy
-variables: in its process these are pointed at a closed port. The study contacts nobody; the tests watch that
-it stays so.
+variables: in its process these point to a closed port. The study contacts no server, and tests check this.
 """
 
 from __future__ import annotations
@@ -36,28 +35,28 @@ _NOWHERE = {
 _FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1"}  # NumPy's, which have nothing to do there
 # A call takes milliseconds, and a start seconds on a busy machine.
 LIMIT_S = 120.0
-# Of memory for its data, with stacks of a thread per core; and for each byte of an image, which it copies.
+# Memory for its data, including stacks of a thread per core; and per byte of an image, which it copies.
 _MOST_BYTES, _MOST_BYTES_PER_BYTE = 700 * 2**20 + 2**24 * (os.cpu_count() or 1), 3
 
 
 class IsolationError(InputError):
-    """A library in a process of its own gave up, or its process ended."""
+    """A library in a separate process failed, or its process ended."""
 
 
 class IsolatedProcess:
-    """A program of this package that loads a native library, run when first asked and again after it ended.
+    """A program of this package that loads a native library; started on first use, and again after it ended.
 
     Parameters
     ----------
     program : list of str
-        Script that speaks as `hicp_lib.detectors.mediapipe.child` says, and its first arguments.
+        Script that follows the protocol of `hicp_lib.detectors.mediapipe.child`, and its first arguments.
     head : dict
     body : bytes
         The first message to it.
     name : str
-        What messages to the user begin with.
+        Start of messages to the user.
     remedy : str
-        What they end with if the program cannot start.
+        End of messages if the program cannot start.
     """
 
     def __init__(self, program: list[str], head: dict, body: bytes, name: str, remedy: str) -> None:
@@ -67,7 +66,7 @@ class IsolatedProcess:
         self._child: _Child | None = None
 
     def start(self) -> None:
-        """Start it unless it runs.
+        """Start it if it is not running.
 
         Raises
         ------
@@ -78,14 +77,14 @@ class IsolatedProcess:
             self._started()
 
     def ask(self, image: np.ndarray) -> np.ndarray:
-        """What the program answers to an RGB image, shape (height, width, 3), uint8.
+        """The program's result for an RGB image, shape (height, width, 3), uint8.
 
         Raises
         ------
         IsolationError
-            If it cannot tell, or its process ends; the next call starts another.
+            If it fails, or its process ends; the next call starts another.
         InputError
-            If it is no such image.
+            If it is not such an image.
         """
         if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or not image.size:
             raise InputError(
@@ -99,7 +98,7 @@ class IsolatedProcess:
         return np.frombuffer(body).reshape(head["shape"])
 
     def _started(self) -> _Child:
-        # After a fork the pipes belong to the process that made them.
+        # After a fork the pipes belong to the parent process.
         if self._child is None or self._child.owner != os.getpid():
             try:
                 child = _Child(self._program)
@@ -117,7 +116,7 @@ class IsolatedProcess:
         except (EOFError, OSError):
             self._child = None
             raise IsolationError(f"{self._name}: {child.end()}; {remedy}") from None
-        except BaseException:  # an interrupted wait: the answer would be taken for that to the next image
+        except BaseException:  # after an interrupt, this answer would be read as that to the next image
             self._child = None
             child.close()
             raise
@@ -127,7 +126,7 @@ class IsolatedProcess:
 
 
 class _Child:
-    """A running program: ended when nothing refers to it any more, or this process ends in whatever way."""
+    """A running program; ended when nothing refers to it any more, or when this process ends in any way."""
 
     def __init__(self, program: list[str]) -> None:
         self.owner = os.getpid()
@@ -139,7 +138,7 @@ class _Child:
         self._process = subprocess.Popen(
             [sys.executable, *program, *map(str, inherited)],
             stdin=subprocess.DEVNULL,
-            stdout=self._stderr,  # what the library prints is no answer
+            stdout=self._stderr,  # keeps the library's output out of the answers
             stderr=self._stderr,
             env=offline_environment(),
             pass_fds=inherited,
@@ -151,7 +150,7 @@ class _Child:
         self._limit(0)
 
     def _limit(self, image_bytes: int) -> None:
-        """Bound the program's memory, where the system can: what its models ask for is not known before."""
+        """Limit the program's memory, where the system can: its models' needs are not known beforehand."""
         most = int(raised(_MOST_BYTES + _MOST_BYTES_PER_BYTE * image_bytes))
         with suppress(ImportError, AttributeError, OSError):
             import resource
@@ -159,7 +158,7 @@ class _Child:
             resource.prlimit(self._process.pid, resource.RLIMIT_DATA, (most, resource.RLIM_INFINITY))
 
     def show(self, image: np.ndarray) -> None:
-        """Put an image where the program sees it."""
+        """Put an image into shared memory."""
         if image.size > len(self._pixels):
             self._limit(image.size)
             self._shared.truncate(image.size)
@@ -172,7 +171,7 @@ class _Child:
         return receive(self._pipe)
 
     def end(self) -> str:
-        """How it ended, in words; it is about to, since it does not speak any more."""
+        """Wait for its end, and describe it in words."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(10.0)
         status = self._process.poll()
@@ -182,7 +181,7 @@ class _Child:
 
 
 def offline_environment() -> dict[str, str]:
-    """This process's environment for a child, but with every way out led to a closed port."""
+    """This process's environment for a child, with all proxies set to a closed port."""
     nowhere = _NOWHERE | {name.upper(): value for name, value in _NOWHERE.items()}
     return child_environment() | _FEW_THREADS | nowhere
 
@@ -202,7 +201,7 @@ def _close(process: subprocess.Popen, files: tuple[Connection | IO[bytes], ...],
         process.kill()
         process.wait()
     else:
-        process.returncode = 0  # a copy of its parent cannot wait for it, and need not
+        process.returncode = 0  # a fork of its parent cannot wait for it, and need not
 
 
 def _in_words(status: int | None) -> str:
@@ -217,7 +216,7 @@ def _in_words(status: int | None) -> str:
 
 
 def _last_line(stderr: IO[bytes]) -> str:
-    """The last line a library wrote that is not part of a trace of the stack."""
+    """The last line a library wrote that is not part of a stack trace."""
     stderr.seek(max(0, stderr.seek(0, os.SEEK_END) - 8192))
     lines = stderr.read().decode(errors="replace").splitlines()
     said = [line for line in lines if line.strip() and not line.startswith((" ", "@", "***", "\t"))]

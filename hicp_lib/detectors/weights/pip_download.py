@@ -5,12 +5,12 @@ import sys
 
 from hicp_lib.core.children import child_environment
 
-# pip gives up a server that says nothing, but not one that says a byte now and then.
+# pip has a timeout for silent servers, but none for one that keeps sending single bytes.
 TIMEOUT_S = 3600.0
 
 
 def run_pip(*arguments: str) -> str | None:
-    """Run a command of pip's on wheels that a file of requirements names with their hashes.
+    """Run a pip command on wheels that a requirements file names with their hashes.
 
     pip's own configuration (index, proxy, certificates) applies.
 

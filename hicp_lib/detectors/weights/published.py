@@ -1,9 +1,9 @@
-"""Weights their authors publish for download: fetched one by one, by name, and never by default.
+"""Weights that their authors publish for download: fetched one by one, by name, never by default.
 
 `data/published_weights.json` names each download with its licence and, where known, its size and SHA-256.
 Where the hash is not known, the first fetch records it in the cache, in `published_weights.lock.json`; a
-download that differs later is refused. Of an archive one member is read, in memory; nothing is unpacked and
-nothing fetched is executed.
+download that differs later is refused. From an archive only one member is read, in memory; nothing is
+unpacked or executed.
 """
 
 import stat
@@ -21,7 +21,7 @@ from hicp_lib.detectors.weights.default import file_status, refuse_other_names, 
 from hicp_lib.detectors.weights.url_download import download
 
 REGISTRY_PATH = DATA_DIR / "published_weights.json"
-# No published model comes near it; a server or an archive that gives more is not to be believed.
+# Far above any published model; a server or an archive that gives more is not trusted.
 MAX_BYTES = 1 << 30
 
 
@@ -32,7 +32,7 @@ class Published:
     Attributes
     ----------
     name : str
-        What users type.
+        The name that users type.
     url : str
         Where its authors publish it.
     member : str or None
@@ -107,7 +107,7 @@ def status(model: Published) -> str:
 
 
 def fetch_published(name: str) -> Published:
-    """Get one published weight file, unless it is here and sound; it is then at the result's `path`.
+    """Get one published weight file, unless it is present and intact; it is then at the result's `path`.
 
     Raises
     ------
@@ -130,9 +130,9 @@ def fetch_published(name: str) -> Published:
 
 
 def check_use(path: Path, content: bytes) -> None:
-    """Hold a weight file that is about to be used against the hash recorded when it was fetched.
+    """Check a weight file, before use, against the hash recorded when it was fetched.
 
-    Files that were not fetched by name are the user's own, and pass.
+    Files that were not fetched by name are the user's own and are not checked.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def check_use(path: Path, content: bytes) -> None:
 
 
 def _obtain(model: Published, folder: Path) -> Path:
-    """The download put in its place by hand, or else the one from its address."""
+    """The download placed by hand, or else from its address."""
     if model.by_hand.is_file():
         return model.by_hand
     problem = download(model.url, folder / model.file, MAX_BYTES)
@@ -183,9 +183,9 @@ def _verified(model: Published, source: Path) -> str:
 def _read_member(archive: Path, member: str) -> bytes:
     """Content of the one regular file called `member` in a zip archive, whatever folder it lies in.
 
-    Names in there are never those of files here: whether they lead out of a folder does not matter.
+    Names in the archive are never used as file names here, so unsafe ones do not matter.
     """
-    problem = f"is not a sound zip archive with {member}"
+    problem = f"is not an intact zip archive with {member}"
     try:
         with zipfile.ZipFile(archive) as file:
             named = [entry for entry in file.infolist() if PurePosixPath(entry.filename).name == member]
@@ -205,12 +205,12 @@ def _records() -> dict[str, dict[str, str]]:
     if not isinstance(records, dict) or any(
         not isinstance(record, dict) or record.keys() != keys for record in records.values()
     ):
-        raise InputError(f"{path}: not a record of hashes; restore it, or delete it to record them anew")
+        raise InputError(f"{path}: not a record of hashes; restore it, or delete it to record them again")
     return records
 
 
 def _record(model: Published, sha256: str, file_sha256: str) -> None:
-    """Record the hashes of a first fetch; those of a later one must be the same."""
+    """Record the hashes at the first fetch; those of later ones must be equal."""
     records = _records()
     record = {"url": model.url, "sha256": sha256, "file_sha256": file_sha256}
     if model.name not in records:

@@ -1,4 +1,4 @@
-"""Get one file from a web address: whole or not at all, and never waiting without end."""
+"""Download one file from a web address, whole or not at all, with limits on time."""
 
 import time
 from functools import partial
@@ -11,7 +11,7 @@ from urllib.request import Request, build_opener
 
 from hicp_lib.core.errors import one_line
 
-# Without an answer for so long, the server is given up; and when it is slower than that from then on.
+# Timeout of a silent server, and minimum speed from then on.
 TIMEOUT_S, LEAST_BYTES_PER_S = 30.0, 5000
 
 
@@ -28,18 +28,18 @@ def download(url: str, target: Path, max_bytes: int) -> str | None:
     Returns
     -------
     str or None
-        None when the file is there and whole, otherwise one line saying what went wrong; `target` is then
-        not to be used.
+        None if the file is complete, otherwise one line saying what went wrong; `target` must then not be
+        used.
     """
     request = Request(url, headers={"User-Agent": "hicp"})
     opened, begin_s = partial(build_opener().open, request, timeout=TIMEOUT_S), time.monotonic()
     try:
-        with ThreadPool(1) as thread:  # a server may take its time over each letter of what it says first
+        with ThreadPool(1) as thread:  # a server may send its headers very slowly
             answer = thread.apply_async(opened).get(TIMEOUT_S)
         with answer as response, open(target, "wb") as file:
             if urlsplit(response.url).scheme != urlsplit(url).scheme:
                 return f"led to {response.url}"
-            # Without the announced size, a connection that broke off would pass for a whole file.
+            # Without an announced size, a broken connection would look like a complete file.
             announced = int(response.headers["Content-Length"] or -1)
             if not 0 < announced <= max_bytes:
                 return f"size announced: {announced} bytes, expected up to {max_bytes}"

@@ -1,7 +1,7 @@
-"""Weights of the user's own, named once: what a detector that needs a model runs on where none is given.
+"""The user's own weights, registered once for a detector that needs a model.
 
-Notebooks and the report name detectors, not files. `hicp models use` writes down which files, and which
-other options, such a detector takes (`own_detectors.json` in the cache); options given at a call come first.
+Notebooks and the report name detectors, not files. `hicp models use` stores which files and other options
+such a detector takes (`own_detectors.json` in the cache); options given in a call take precedence.
 """
 
 import json
@@ -13,17 +13,17 @@ from hicp_lib.core.files import cache_dir, read_json, sha256_bytes, sha256_file,
 
 
 def user_options_path() -> Path:
-    """The file of the options kept."""
+    """The file of the stored options."""
     return cache_dir() / "own_detectors.json"
 
 
 def all_user_options() -> dict[str, dict[str, Any]]:
-    """Options kept, by detector.
+    """Stored options, by detector.
 
     Raises
     ------
     InputError
-        If the file is not one of options.
+        If the file does not contain options.
     """
     path = user_options_path()
     kept = read_json(path) if path.is_file() else {}
@@ -35,12 +35,12 @@ def all_user_options() -> dict[str, dict[str, Any]]:
 
 
 def user_options(name: str) -> dict[str, Any]:
-    """Options kept for a detector; none where nothing was kept."""
+    """Stored options of a detector; empty if there are none."""
     return all_user_options().get(name, {})
 
 
 def keep_user_options(name: str, options: dict[str, Any]) -> None:
-    """Keep a detector's options, files by their absolute path, in the place of those kept before."""
+    """Store a detector's options, files by absolute path, replacing earlier ones."""
     kept = {key: str(Path(of).resolve()) if _is_file(key, of) else of for key, of in options.items()}
     write_json(user_options_path(), all_user_options() | {name: kept}, indent=2)
 
@@ -55,5 +55,5 @@ def user_weights_sha256() -> dict[str, str]:
 
 
 def _is_file(option: str, value: Any) -> bool:
-    """Whether an option names a file, as `model` and `hand_model` do; others may be called as a file is."""
+    """Whether an option is a file, as `model` and `hand_model` are; others' values may look like files."""
     return option.split("_")[-1] == "model" and isinstance(value, str | Path) and Path(value).is_file()

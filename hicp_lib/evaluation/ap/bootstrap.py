@@ -1,7 +1,7 @@
-"""95 % bootstrap intervals of AP and AR: images are drawn with replacement (Efron's percentile interval).
+"""95 % bootstrap intervals of AP and AR: images are resampled with replacement (Efron's percentile interval).
 
-What is resampled are the matches, so a thousand draws cost a fraction of a second. Images that belong
-together (crops of one photograph) can be drawn together through `clusters`.
+The matches are resampled, so a thousand draws take a fraction of a second. Images that belong together (crops
+of one photograph) can be resampled together through `clusters`.
 """
 
 from collections.abc import Hashable, Mapping, Sequence
@@ -13,7 +13,7 @@ from hicp_lib.evaluation.ap import cocoeval
 from hicp_lib.evaluation.ap.evaluate import Evaluation
 from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN, Draws, with_interval
 
-_BLOCK = 2**16  # detections of several draws that are gone through at a time
+_BLOCK = 2**16  # detections of several draws processed at a time
 Clusters = Mapping[int, Hashable]
 Samples = Mapping[str, np.ndarray]  # metric -> its value in every draw
 Figures = dict[str, tuple[float, float, float]]  # metric -> its value, and the ends of its 95 % interval
@@ -22,37 +22,37 @@ Figures = dict[str, tuple[float, float, float]]  # metric -> its value, and the 
 def bootstrap_intervals(
     evaluation: Evaluation, draws: Draws = Draws(), clusters: Clusters | None = None
 ) -> Figures:
-    """Figures with their 95 % intervals.
+    """Metrics with their 95 % intervals.
 
     Parameters
     ----------
     evaluation : Evaluation
-        Whose figures.
+        The evaluation.
     draws : Draws, optional
         Of clusters.
     clusters : Clusters, optional
-        Anything by image id; images of equal value are drawn together. Each by itself when left out.
+        Any value by image id; images with equal values are resampled together. By default each image alone.
 
     Returns
     -------
     Figures
-        Of every metric; NaN where nobody counts, and no interval from fewer than `MIN_DRAWN` clusters.
+        Of every metric; NaN if no person is evaluated, and no interval from fewer than `MIN_DRAWN` clusters.
     """
     return intervals(evaluation.metrics(), resample([evaluation], draws, clusters)[0])
 
 
 def difference(a: Evaluation, b: Evaluation, of_a: Samples, of_b: Samples) -> Figures:
-    """Differences a - b with 95 % intervals, both on the same draw of images each time.
+    """Differences a - b with 95 % intervals, both on the same resamples of images.
 
     The images are paired by their ids: two detectors on one dataset, or one detector on Basic and Headless,
-    where equal ids mean the same person. Images only one of them has are drawn, too.
+    where equal ids mean the same person. Images that only one of them has are resampled, too.
 
     Parameters
     ----------
     a, b : Evaluation
         What is compared.
     of_a, of_b : Samples
-        Their figures on the draws, as from one call of `resample`.
+        Their metrics on the draws, from one call of `resample`.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def difference(a: Evaluation, b: Evaluation, of_a: Samples, of_b: Samples) -> Fi
 def resample(
     evaluations: Sequence[Evaluation], draws: Draws, clusters: Clusters | None = None
 ) -> list[Samples]:
-    """Figures on draws of images that all evaluations share.
+    """Metrics on resamples of images, shared by all evaluations.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def resample(
     Returns
     -------
     list of Samples
-        Per evaluation and metric `draws.n` values; none from fewer than `MIN_DRAWN` clusters.
+        Per evaluation and metric `draws.n` values; none if there are fewer than `MIN_DRAWN` clusters.
     """
     image_ids = np.unique(np.concatenate([e.matches.image_ids for e in evaluations]))
     rows: dict[Hashable, int] = {}
@@ -92,7 +92,7 @@ def resample(
     rng = np.random.default_rng(draws.seed)
     n_draws = draws.n if n >= MIN_DRAWN else 0
     drawn = (np.bincount(rng.integers(n, size=n), minlength=n)[cluster] for _ in range(n_draws))
-    # Of n things drawn n times, none comes up more often than a byte holds; images may be many.
+    # An image is practically never drawn more than 255 times, so bytes suffice; images may be many.
     weights = [of.astype(np.uint8) for of in drawn]
     return [_samples(e.matches, weights, place) for e, place in zip(evaluations, places, strict=True)]
 
@@ -106,7 +106,7 @@ def _samples(matches: cocoeval.Matches, weights: Sequence[np.ndarray], place: np
 
 
 def intervals(values: Mapping[str, float], samples: Samples) -> Figures:
-    """Values by metric, with percentiles over the draws (`resample`) in which somebody counts.
+    """Values by metric, with percentiles over the draws (`resample`) that have evaluated people.
 
     Examples
     --------

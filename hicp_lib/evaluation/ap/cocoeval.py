@@ -1,7 +1,8 @@
-"""COCO's keypoint evaluation on arrays: who is matched to whom, and the precision and recall that follow.
+"""COCO's keypoint evaluation on arrays: matching of detections to people, precision and recall.
 
 The rules are pycocotools', and so are the numbers (`tests/evaluation/ap/test_cocoeval.py`). There is no
-object per person: the surest detections of all images choose at once, then the second ones, and so on.
+Python object per person: the best detections of all images are matched at once, then the second-best ones,
+and so on.
 """
 
 from collections.abc import Callable, Iterator
@@ -15,17 +16,18 @@ RECALLS = np.linspace(0.0, 1.0, 101)
 METRICS = ("AP", "AP50", "AP75", "AR", "AR50", "AR75")
 MAX_DETECTIONS = 20
 _AT_75 = 5  # index into `OKS_THRESHOLDS`
-_BLOCK = 2**9  # pairs whose similarity is taken at a time: arrays that stay in a processor's cache
+_BLOCK = 2**9  # pairs whose similarity is computed at a time, to stay in the processor's cache
 
-# Rows of people (n, m) and of detections (n,) -> how alike each detection and its m people are (n, m).
+# Rows of people (n, m) and of detections (n,) -> similarity of each detection and its m people (n, m).
 Similarity = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 class People(NamedTuple):
-    """Annotated people (or hands, ...), n of them: only those of a detection's slot can be matched to it.
+    """n annotated people (or hands, ...): a detection can be matched only to those in its slot.
 
-    `slots` (n,) of int; `counts` (n,) of bool: who does not count is matched only where nobody else is, and
-    forgives that detection; `is_crowd` (n,) of bool: who is, any number of detections.
+    `slots` (n,) of int; `counts` (n,) of bool: people who do not count are matched only if no other is
+    available, and that detection is ignored; `is_crowd` (n,) of bool: crowds can match any number of
+    detections.
     """
 
     slots: np.ndarray
@@ -34,7 +36,7 @@ class People(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Detections, n of them: `slots` (n,) of int, finite `scores` (n,)."""
+    """n detections: `slots` (n,) of int, finite `scores` (n,)."""
 
     slots: np.ndarray
     scores: np.ndarray
@@ -42,12 +44,12 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True)
 class Matches:
-    """Which detections are right, sorted by falling score: all that AP and AR depend on.
+    """Which detections are correct, sorted by decreasing score: all that AP and AR depend on.
 
     Attributes
     ----------
     image_ids, n_people : array of int, shape (n_images,)
-        The images, and the people in each who count.
+        The images, and the number of evaluated people in each.
     image_rows : array of int, shape (n_detections,)
         The detections' rows in `image_ids`.
     is_true, is_false : array of bool, shape (10, n_detections)
@@ -64,18 +66,18 @@ class Matches:
 def match(
     image_ids: np.ndarray, people: People, found: Found, similarity: Similarity, per_image: int = 1
 ) -> Matches:
-    """Match detections to people, the surest of each slot first.
+    """Match detections to people, the highest score of each slot first.
 
     Parameters
     ----------
     image_ids : array of int, shape (n_images,)
         All images, ascending.
     people : People
-        Who is to be found.
+        The annotated people.
     found : Found
-        What was; the 20 best of a slot take part.
+        The detections; the 20 best of a slot are used.
     similarity : callable
-        OKS, or what takes its place.
+        OKS or a replacement.
     per_image : int, optional
         Number of slots of an image; those of the first image come first.
 
@@ -113,7 +115,7 @@ def _ranked(found: Found) -> tuple[np.ndarray, np.ndarray]:
 def _rivals(
     people_slots: np.ndarray, found_slots: np.ndarray, rank: np.ndarray
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Places of detections of one rank, the best first, and those of the people in the slot of each."""
+    """Rows of detections of one rank, the best first, and of the people in the slot of each."""
     first = np.searchsorted(people_slots, found_slots)
     n = np.searchsorted(people_slots, found_slots, side="right") - first
     for at_rank, n_people in sorted(set(zip(rank.tolist(), n.tolist(), strict=True))):
@@ -124,10 +126,10 @@ def _rivals(
 
 
 def _chosen(fits: np.ndarray, free: np.ndarray, counted: np.ndarray) -> np.ndarray:
-    """Whom detections are matched to: their places, -1 for nobody; shape (10, n_detections).
+    """The people to whom detections are matched, -1 for none; shape (10, n_detections).
 
-    A detection takes whom it fits best, of equal ones the last, of those free and near enough who count; only
-    where there is none, of those who do not.
+    A detection takes the most similar person (of equal ones the last) among the free ones above the threshold
+    who count; only if there is none, among those who do not count.
 
     Parameters
     ----------
@@ -143,26 +145,26 @@ def _chosen(fits: np.ndarray, free: np.ndarray, counted: np.ndarray) -> np.ndarr
 
 
 def precision_recall(matches: Matches, weights: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """COCO's interpolated precision and final recall when images occur several times, or not at all.
+    """COCO's interpolated precision and final recall, with a weight per image.
 
-    With all weights 1 this repeats pycocotools to the bit.
+    With all weights 1 this equals pycocotools to the bit.
 
     Parameters
     ----------
     matches : Matches
-        Which detections are right.
+        Which detections are correct.
     weights : array of int, shape (..., n_images), optional
-        How often each image occurs; once when left out.
+        How often each image occurs; once by default.
 
     Returns
     -------
     precision : array, shape (..., 10, 101)
-        NaN when nobody counts.
+        NaN without evaluated people.
     recall : array, shape (..., 10)
-        NaN when nobody counts.
+        NaN without evaluated people.
     """
     weights = np.ones(len(matches.image_ids), dtype=int) if weights is None else weights
-    draws = weights.reshape(int(np.prod(weights.shape[:-1])), -1)  # of no images, too
+    draws = weights.reshape(int(np.prod(weights.shape[:-1])), -1)  # also without images
     n_people = draws @ matches.n_people
     precision = np.zeros((len(draws), len(OKS_THRESHOLDS), len(RECALLS)))
     recall = np.zeros(precision.shape[:2])
@@ -171,7 +173,7 @@ def precision_recall(matches: Matches, weights: np.ndarray | None = None) -> tup
         if seen is None or (counted != is_true | is_false).any():
             counted = is_true | is_false
             seen = np.cumsum(times * counted, axis=1)
-        # Precision rises only at what is right, and recall, too.
+        # Precision and recall rise only at correct detections.
         rows = np.flatnonzero(is_true)
         true = np.cumsum(times.take(rows, axis=1), axis=1)
         reached = true / np.maximum(n_people, 1)[:, None]

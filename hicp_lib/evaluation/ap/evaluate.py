@@ -1,4 +1,4 @@
-"""Average precision and recall of keypoint detections: COCO's protocol, its open choices in `options`."""
+"""Average precision and recall of keypoint detections by COCO's protocol; its open choices: `options`."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -15,7 +15,7 @@ from hicp_lib.evaluation.ap.extended_oks import PRESENCE_CUT, extended_oks, know
 from hicp_lib.evaluation.ap.options import VISIBLE, Options, choose
 from hicp_lib.formats.annotations import SEGMENT_OF_BOX, Annotations
 
-_AT_ONCE = 2**12  # images whose detections are checked at a time
+_AT_ONCE = 2**12  # number of images checked at a time
 
 
 @dataclass(frozen=True)
@@ -27,21 +27,21 @@ class Evaluation:
     group : str
         Of keypoints.
     options : Options
-        The choices made.
+        The options used.
     AP, AP50, AP75, AR, AR50, AR75 : float
-        In [0, 1]; NaN when nobody counts.
+        In [0, 1]; NaN without evaluated people.
     n_people : int
-        People (or hands) who count.
+        Number of evaluated people (or hands).
     n_ignored : int
         Crowds, other people, people without a labelled keypoint of the group.
     n_images, n_detections : int
-        Images, and detections that take part.
+        Number of images, and of evaluated detections.
     precision : array, shape (10, 101)
         Per OKS threshold .5:.05:.95 at recall 0:.01:1.
     recall : array, shape (10,)
         Per OKS threshold.
     matches : cocoeval.Matches
-        What the bootstrap resamples.
+        Used by the bootstrap.
     """
 
     group: str
@@ -61,11 +61,11 @@ class Evaluation:
     matches: cocoeval.Matches
 
     def metrics(self) -> dict[str, float]:
-        """The six figures by name."""
+        """The six metrics by name."""
         return {name: getattr(self, name) for name in cocoeval.METRICS}
 
     def row(self) -> dict:
-        """Group, options, figures and counts, as one row of a table."""
+        """Group, options, metrics and counts, as one row of a table."""
         counts = ("n_people", "n_ignored", "n_images", "n_detections")
         numbers = self.metrics() | {name: getattr(self, name) for name in counts}
         return {"group": self.group, **asdict(self.options), **numbers}
@@ -74,7 +74,7 @@ class Evaluation:
 def evaluate(
     annotations: Annotations, detections: Mapping[int, Detections], group: str = "body", **options: Any
 ) -> Evaluation:
-    """Evaluate detections on every annotated image; an image without an entry has none.
+    """Evaluate detections on every annotated image; an image without an entry has no detections.
 
     Parameters
     ----------
@@ -94,8 +94,8 @@ def evaluate(
     Raises
     ------
     InputError
-        For detections of unknown images or with scores or coordinates that are no numbers, for unknown
-        groups and options, and for area "source" where people have none.
+        For detections of unknown images or with non-finite scores or coordinates, for unknown groups and
+        options, and for area "source" if people have none.
     """
     objects, chosen = choose(group, options)
     images = np.array(sorted(annotations.images), dtype=np.int64)
@@ -139,12 +139,12 @@ def _flat(values: np.ndarray, objects: np.ndarray) -> np.ndarray:
 
 
 def _slots(image_rows: np.ndarray, objects: np.ndarray) -> np.ndarray:
-    """Left hands meet left hands: an image has a slot for each of a person's objects."""
+    """An image has a slot for each object of a person, so that left hands are matched to left hands only."""
     return (image_rows[:, None] * len(objects) + np.arange(len(objects))).ravel()
 
 
 def check_detections(detections: Mapping[int, Detections], annotations: Annotations) -> None:
-    """Refuse what an evaluator would swallow or stumble over.
+    """Refuse detections that would silently distort an evaluation.
 
     Raises
     ------
@@ -158,7 +158,7 @@ def check_detections(detections: Mapping[int, Detections], annotations: Annotati
 def _checked(
     detections: Mapping[int, Detections], annotations: Annotations
 ) -> Iterator[tuple[np.ndarray, Detections]]:
-    """Image ids of people found, and these people, of some images at a time: they are not all held twice."""
+    """Image ids and detections, in batches of images, so that memory does not hold everything twice."""
     for image_id, found in detections.items():
         if image_id not in annotations.images:
             problem = "not among the annotated images; evaluate them on their own annotations"
@@ -190,14 +190,14 @@ def _refuse_unsound(stacked: Detections, image_ids: np.ndarray) -> None:
 
 
 def _sound(found: Detections) -> np.ndarray:
-    """Which keypoints are finite, or not given: NaN in both coordinates, with score 0; (n, 136)."""
+    """Which keypoints are finite, or missing (NaN in both coordinates, with score 0); (n, 136)."""
     u, v = found.keypoints_px[..., 0], found.keypoints_px[..., 1]
     absent = np.isnan(u) & np.isnan(v) & (found.scores == 0)
     return np.isfinite(found.scores) & (absent | np.isfinite(u) & np.isfinite(v))
 
 
 def people_seen(annotations: Annotations, objects: np.ndarray, options: Options) -> Annotations:
-    """The people an evaluation sees, with `visibility` and `areas_px2` as the options want them.
+    """The people for an evaluation, with `visibility` and `areas_px2` according to the options.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def _detections_seen(
     detections: Mapping[int, Detections], annotations: Annotations, images: np.ndarray, objects: np.ndarray,
     options: Options,
 ) -> tuple[np.ndarray, ...]:  # fmt: skip
-    """Slots, keypoints, which of them are declared present, and scores of the objects that take part."""
+    """Slots, keypoints, which of them are declared present, and scores of the evaluated objects."""
     n, most, k = 0, len(objects) * sum(map(len, detections.values())), objects.shape[1]
     of_all = np.empty(most, int), np.empty((most, k, 2)), np.empty((most, k), bool), np.empty(most)
     for image_ids, found in _checked(detections, annotations):

@@ -1,26 +1,26 @@
-"""Extended OKS: points outside the picture count, and giving one inside is wrong.
+"""Extended OKS: keypoints outside the picture count, and placing one inside is an error.
 
-Plain OKS leaves out what is not labelled in the picture, so an invented head costs nothing. Extended OKS
-(Ex-OKS: Purkrabek and Matas, "ProbPose", CVPR 2025, the section on evaluation) is the mean of the same terms
-over all keypoints whose truth is known, in the picture or outside it, with a distance that asks for a
-decision, too. A keypoint is declared *present* when its score is at least a cut, absent otherwise:
+Plain OKS ignores keypoints that are not labelled in the picture, so a hallucinated head costs nothing.
+Extended OKS (Ex-OKS: Purkrabek and Matas, "ProbPose", CVPR 2025, the section on evaluation) is the mean of
+the same terms over all keypoints whose truth is known, inside or outside the picture, with a distance that
+includes a decision. A keypoint is declared *present* when its score is at least a threshold, absent
+otherwise:
 
-- truly inside, declared present: the distance between the two places, as in OKS;
-- truly outside, declared absent: 0, which is right;
-- truly outside, declared present: how far the place lies from the border of the activation window;
-- truly inside, declared absent: how far the true place lies from it.
+- inside, declared present: the distance between the two positions, as in OKS;
+- outside, declared absent: 0, which is correct;
+- outside, declared present: the distance of the given position from the border of the activation window;
+- inside, declared absent: the distance of the true position from that border.
 
-The activation window is what a top-down network sees: the person's box brought to 3:4 and grown 1.25 times
-about its centre. As the authors' tool measures it, the distance to the border is that to the nearest upright
-edge and to the nearest level edge, in one (Euclidean): towards a corner of the window. Inside the window and
-away from its corners that is wrong by any threshold of AP; in a corner it is forgiven. A truth between the
-picture and the window's border is outside, unless the annotations have `pad_to_contain`: then what the
-window contains is inside.
+The activation window is what a top-down network sees: the person's box extended to 3:4 and enlarged 1.25
+times about its centre. As in the authors' tool, the distance to the border combines (Euclidean) those to the
+nearest vertical and to the nearest horizontal edge, so it points to a corner of the window. Away from the
+corners, such an error fails every threshold of AP; near a corner it is tolerated. A keypoint between the
+picture and the window's border is outside, unless the annotations have `pad_to_contain`: then keypoints in
+the window are inside.
 
-The authors' tool, exococotools, also forgives every detection in a picture where nobody counts, and rounds
-the window to single precision. COCO does neither, nor is it done here.
-`hicp_lib.evaluation.ap.evaluate` takes it with the option `outside`; people of whom only points outside are
-known then count as well.
+The authors' tool, exococotools, also ignores every detection in an image without evaluated people, and rounds
+the window to single precision. COCO does neither, and neither do we. `hicp_lib.evaluation.ap.evaluate` uses
+it with the option `outside`; people of whom only keypoints outside are known then count as well.
 """
 
 import numpy as np
@@ -30,12 +30,12 @@ from hicp_lib.core.oks import oks_terms
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.formats.cropcoco import OUTSIDE, PAD_KEY, PADDING
 
-PRESENCE_CUT = 0.5  # least score of a keypoint that is declared present, the authors' default
+PRESENCE_CUT = 0.5  # minimum score of a keypoint that is declared present, the authors' default
 _ASPECT = 3 / 4  # width by height of a network's input
 
 
 def activation_windows(boxes_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What a top-down network sees of people in boxes.
+    """The windows around boxes that a top-down network sees.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def activation_windows(boxes_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def known_flags(people: Annotations) -> np.ndarray:
-    """What is known of keypoints, where `pad_to_contain` decides over what is outside.
+    """Flags of keypoints, with `pad_to_contain` deciding what is outside.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def known_flags(people: Annotations) -> np.ndarray:
     Returns
     -------
     array, shape (n, 136)
-        Above 0 inside, below 0 outside, 0 not known.
+        Above 0 inside, below 0 outside, 0 unknown.
     """
     flags = people.visibility.copy()
     for i, extra in enumerate(people.extras):
@@ -94,7 +94,7 @@ def extended_oks(
     Parameters
     ----------
     truth_px : array, shape (..., k, 2)
-        Of the annotated people; not read where they are outside.
+        Of the annotated people; not used where they are outside.
     flags : array, shape (..., k)
         As of `known_flags`.
     boxes_px : array, shape (..., 4)
@@ -104,14 +104,14 @@ def extended_oks(
     found_px : array, shape (..., k, 2)
         NaN where the detection gives no keypoint.
     present : array of bool, shape (..., k)
-        Which of its keypoints the detection declares present; those that are given, at most.
+        Which of its keypoints the detection declares present; missing ones never are.
     sigmas : array, shape (k,)
         Constants of the keypoints.
 
     Returns
     -------
     array, shape (...)
-        In [0, 1]. For people of whom nothing is known, by how far the detection leaves their window.
+        In [0, 1]. For people without known keypoints, by how far the detection leaves their window.
     """
     low_px, high_px = (corner[..., None, :] for corner in activation_windows(boxes_px))
     outside, present = flags[..., None] < 0, present[..., None]

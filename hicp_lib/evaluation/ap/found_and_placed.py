@@ -1,4 +1,4 @@
-"""Found at all, apart from placed well: average precision mixes the two."""
+"""Separate whether people are found from how well they are placed, which AP mixes."""
 
 import pandas as pd
 
@@ -11,10 +11,10 @@ _WELL_PLACED_OKS = 0.5
 
 
 def found_and_placed(people: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
-    """Who is found at all, and how well those who are found are placed.
+    """How many people are found, and how well those are placed.
 
-    A person is found if the detection that fits best has an OKS of at least `matching.MATCH_OKS` (.1): of a
-    lesser one, Ronchi and Perona (2017) do not say whose it is.
+    A person is found if the best detection has an OKS of at least `matching.MATCH_OKS` (.1), the lowest value
+    at which Ronchi and Perona (2017) match a detection to a person.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def found_and_placed(people: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFra
     Returns
     -------
     DataFrame
-        Columns `subset, group, detector, what` (`FOUND`, `OKS_OF_FOUND`, `WELL_PLACED`), `value` (NaN where
+        Columns `subset, group, detector, what` (`FOUND`, `OKS_OF_FOUND`, `WELL_PLACED`), `value` (NaN if
         nobody is found), `low, high` (95 %, over source images), `n` (people), `n_images`.
     """
     by = ["subset", "group", "detector"]

@@ -1,7 +1,7 @@
-"""Hands one by one: how many are found, and what each part of a combination adds to that.
+"""Single hands: how many are found, and what each part of a combination contributes.
 
-A labelled hand counts as found when some detection places its points, on the right side, with an OKS
-of the hand alone (its labelled points, the person's area) above .5.
+A labelled hand counts as found when some detection has its points, on the correct side, with an OKS of this
+hand (its labelled points, the person's area) above .5.
 """
 
 from collections.abc import Iterator, Mapping
@@ -27,8 +27,8 @@ from hicp_lib.formats.annotations import Annotations, source_images
 
 FOUND_OKS = 0.5
 
-# Options of `combined.detector.Combined` and its hand detector. Each step changes one thing of the one before
-# it; the last is the default. The thresholds come second, so that all further steps are at the same.
+# Options of `combined.detector.Combined` and its hand detector. Each step changes one thing; the last one is
+# the default. The thresholds come second, so that all further steps share them.
 _STEPS: dict[str, dict] = read_json(DATA_DIR / "combination_steps.json")
 # How the thresholds among these were chosen.
 _CHOSEN = {
@@ -41,10 +41,10 @@ INGREDIENTS: dict[str, dict] = dict(zip(_STEPS, accumulate(_STEPS.values(), or_)
 
 
 def thresholds() -> pd.DataFrame:
-    """The thresholds of the combination and what each was chosen on: columns `threshold, value, chosen`.
+    """The thresholds of the combination and how each was chosen: columns `threshold, value, chosen`.
 
     "within .005" is the change of the AP of hands on Basic and Headless, both body detectors are
-    `mediapipe-pose` and `movenet-thunder`; seed 11 stands for 100 scenes of development people.
+    `mediapipe-pose` and `movenet-thunder`; seed 11 means 100 scenes of development identities.
     """
     rules = [field for rule in (SquareRule, ArbitrationRule) for field in fields(rule)]
     rows = [(field.name, field.default, field.metadata["chosen"]) for field in rules]
@@ -60,9 +60,9 @@ def compare_hands(truth: Truth, found: Found, baseline: Found, draws: Draws = Dr
     truth : Truth
         By subset.
     found : Found
-        By image id, of every subset and variant, in the order in which the variants follow each other.
+        By image id, of every subset and variant, in the order of the variants.
     baseline : Found
-        By image id, of every subset and one detector, which hands found are set in proportion to.
+        By image id, of every subset and one detector, for the ratio of hands found.
     draws : Draws, optional
         Of the bootstrap.
 
@@ -71,8 +71,8 @@ def compare_hands(truth: Truth, found: Found, baseline: Found, draws: Draws = Dr
     DataFrame
         Columns `subset, variant, AP, AP_low, AP_high, step, step_low, step_high, AR50, n_hands, n_found,
         share, share_low, share_high, ratio, ratio_low, ratio_high`: 95 % bootstrap intervals over source
-        images; `step` is AP less that of the variant before (NaN for the first), `ratio` the hands found per
-        hand the baseline finds, both on the same draws.
+        images; `step` is AP minus that of the variant before (NaN for the first), `ratio` the hands found
+        relative to the baseline, both on the same resamples.
     """
     bases = {subset: run for (subset, _), run in baseline.items()}
     rows = []
@@ -103,7 +103,7 @@ def _rows(
 
 
 def _counts(people: Annotations, found: Mapping, baseline: Mapping, clusters: Mapping) -> np.ndarray:
-    """Per source image: labelled hands, those found, those the baseline finds; shape (n_sources, 3)."""
+    """Per source image: labelled hands, those found, those found by the baseline; shape (n_sources, 3)."""
     table, base = (person_oks(people, of, "each hand", sigmas="halpe") for of in (found, baseline))
     table = table.assign(n=1, found=table["oks"] > FOUND_OKS, base=base["oks"] > FOUND_OKS)
     sources = table["image_id"].map(clusters)
@@ -111,7 +111,7 @@ def _counts(people: Annotations, found: Mapping, baseline: Mapping, clusters: Ma
 
 
 def _with_interval(counts: np.ndarray, of: int, per: int, draws: Draws) -> tuple[Any, Any, Any]:
-    """Ratio of two columns' sums over the rows, with the interval from drawing rows; NaN for 0 / 0."""
+    """Ratio of two columns' sums, with an interval from resampling rows; NaN for 0 / 0."""
     if not counts[:, per].sum():
         return np.nan, np.nan, np.nan
     some, whole = (draw_counts(len(counts), draws) @ counts)[:, [of, per]].T

@@ -1,10 +1,10 @@
-"""Detections judged by every group of keypoints and definition: what `hicp evaluate` tells and writes.
+"""Evaluate detections by every keypoint group and definition: the results of `hicp evaluate`.
 
 Files come in two forms, by their suffix:
 
 - `.json`: what `judge` returns.
-- `.csv`, `.parquet`: a row per definition and metric, with `value`, `low` and `high`; image by image beside
-  it in `OUT.by_image.csv` (or `.parquet`).
+- `.csv`, `.parquet`: a row per definition and metric, with `value`, `low` and `high`; image by image in
+  `OUT.by_image.csv` (or `.parquet`).
 """
 
 import math
@@ -30,7 +30,7 @@ Found = Mapping[int, Detections]
 def judge(
     people: Annotations, found: Found, groups: Iterable[str], by_image: bool, seed: int = 0, **options: str
 ) -> dict[str, Any]:
-    """AP and AR by every definition that `definitions` knows, with intervals over source images.
+    """AP and AR by every definition in `definitions`, with intervals over source images.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def judge(
     groups : iterable of str
         Keys of `hicp_lib.evaluation.ap.options.OBJECTS`.
     by_image : bool
-        Whether image by image, too.
+        Whether to add results image by image.
     seed : int, optional
         Of the bootstrap.
     **options : str
@@ -50,11 +50,11 @@ def judge(
     Returns
     -------
     dict
-        Ready for JSON. Of the first definition `Evaluation.row`, with `metrics` (of each its `value`, `low`
-        and `high`) and `seed`; those of the others as `other_definitions`; and `by_image`, a list of rows of
-        `image_table`. None where there is no figure, as for a group that annotations or detections lack.
+        Ready for JSON. For the first definition `Evaluation.row`, with `metrics` (`value`, `low` and `high`
+        of each) and `seed`; the other definitions as `other_definitions`; and `by_image`, a list of rows of
+        `image_table`. None where there is no value, as for a group that annotations or detections lack.
     """
-    clusters, rows = source_images(people), []  # crops of one image are drawn together
+    clusters, rows = source_images(people), []  # crops of one image are resampled together
     for group, way in (each for of in groups for each in definitions(people, of)):
         evaluation = evaluate(people, found, group, **way, **options)
         row, figures = evaluation.row(), bootstrap_intervals(evaluation, Draws(seed=seed), clusters)
@@ -71,7 +71,7 @@ def judge(
 
 
 def _finite(row: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-    """NaN, where nobody counts, is null in JSON."""
+    """NaN, without evaluated people, is null in JSON."""
     return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row}
 
 
@@ -89,8 +89,8 @@ def image_table(people: Annotations, found: Found, groups: Iterable[str], **opti
     Returns
     -------
     DataFrame
-        Columns `group, image_id, file_name, n_people, n_detections, oks, oks_least`: mean and least over the
-        image's people of their best detection's, 0 where there is none. Images with people of the group only.
+        Columns `group, image_id, file_name, n_people, n_detections, oks, oks_least`: mean and minimum over
+        the image's people of their best detection's OKS, 0 without one. Images with people of the group only.
     """
     parts = [labelled(person_oks(people, found, group, **options), group=group) for group in groups]
     by_image = pd.concat(parts).groupby(["group", "image_id"], sort=False)["oks"]
@@ -102,7 +102,7 @@ def image_table(people: Annotations, found: Found, groups: Iterable[str], **opti
 
 
 def write_judgement(path: Path, judged: dict[str, Any]) -> None:
-    """Write all of it in the format of the file's suffix, as the module says.
+    """Write the results in the format of the file's suffix, as described in this module.
 
     Parameters
     ----------

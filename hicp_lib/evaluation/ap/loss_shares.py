@@ -1,12 +1,12 @@
-"""What average precision is lost to: network, missing head, person finder; and to how it is measured.
+"""Causes of lost average precision: network, missing head, person finder, and the measure itself.
 
-A top-down detector is asked three times: with the whole image as its only box, with the boxes of a person
-finder, and with the true boxes. What it loses with the true boxes is its network's; what it loses beyond that
-with the finder's is the finder's. A bottom-up detector needs no box, and has no such share.
+A top-down detector is run three times: with the whole image as its only box, with the boxes of a person
+finder, and with the true boxes. The loss with true boxes is that of the network; the further loss with the
+finder's boxes is that of the finder. A bottom-up detector needs no boxes and has no such share.
 
-From Basic to Headless the measure changes along with the picture: head keypoints leave the score, the area
-by which OKS allows for errors shrinks with the crop, and the head's scores leave the ranking.
-`head_loss_shares` takes these one by one out of the loss.
+From Basic to Headless not only the image changes but also the measure: head keypoints no longer count, the
+area that scales OKS shrinks with the crop, and the head's scores no longer enter the ranking.
+`head_loss_shares` removes these effects one by one.
 """
 
 from dataclasses import replace
@@ -25,7 +25,7 @@ HEAD_SHARES = ("head points", "area", "ranking", "detector")
 
 
 def box_variants(top_down: str, bottom_up: str) -> dict[str, tuple[str, dict[str, str]]]:
-    """What is run to tell the shares apart: label -> detector and its options.
+    """The runs needed to separate the shares: label -> detector and its options.
 
     Examples
     --------
@@ -40,7 +40,7 @@ def box_variants(top_down: str, bottom_up: str) -> dict[str, tuple[str, dict[str
 
 
 def loss_shares(drawn: Drawn, top_down: str, bottom_up: str) -> pd.DataFrame:
-    """1 - AP of bodies, share by share, of the top-down detector on found boxes and of the bottom-up one.
+    """Shares of 1 - AP of bodies, for the top-down detector on detected boxes and the bottom-up one.
 
     Parameters
     ----------
@@ -52,9 +52,9 @@ def loss_shares(drawn: Drawn, top_down: str, bottom_up: str) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns `subset, detector, share` (of `SHARES`), `value, low, high`; of either detector, and the
-        difference where both have one. In "headless" the network's share is that in "basic", the missing
-        head's what true boxes lose from there; a share can be negative.
+        Columns `subset, detector, share` (of `SHARES`), `value, low, high`; of either detector, and their
+        difference if both have the share. In "headless" the network's share is that in "basic", and the
+        missing head's share is the further loss with true boxes; a share can be negative.
     """
     _, found_boxes, true_boxes, _ = box_variants(top_down, bottom_up)
     rows = []
@@ -70,7 +70,7 @@ def loss_shares(drawn: Drawn, top_down: str, bottom_up: str) -> pd.DataFrame:
 
 
 def _by_share(drawn: Drawn, chain: tuple[tuple[str, str], ...]) -> dict[str, np.ndarray]:
-    """Losses of AP from case to case of a chain, as it is and on the draws; none between equal cases."""
+    """Losses of AP along a chain of cases, on the sample and on the draws; zero between equal cases."""
     values = [_values(drawn, (*case, "body")) for case in chain]
     steps = zip(SHARES, (None, *chain), chain, [1.0, *values], values, strict=False)
     return {share: before - after for share, last, case, before, after in steps if case != last}
@@ -82,12 +82,12 @@ def _values(drawn: Drawn, case: tuple[str, str, str]) -> np.ndarray:
 
 
 def head_loss_shares(truth: Truth, found: Found, drawn: Drawn, draws: Draws = Draws()) -> pd.DataFrame:
-    """The loss of AP from Basic to Headless, and what of it is the definition's.
+    """The loss of AP from Basic to Headless, and the shares of it due to the measure.
 
-    The loss is taken four times, each time with one thing more held equal: as it is; on the keypoints that
+    The loss is computed four times, each time with one more effect removed: as it is; on the keypoints that
     are labelled in both; with the person's area before any cut; ranked by the scores of the keypoints below
-    the head (hands are ranked by their own throughout). What a step takes away is that thing's share, what is
-    left is the detector's.
+    the head (hands are always ranked by their own). The reduction in a step is the share of that effect; the
+    rest is the detector's own loss.
 
     Parameters
     ----------
@@ -122,13 +122,13 @@ def head_loss_shares(truth: Truth, found: Found, drawn: Drawn, draws: Draws = Dr
 
 
 def _losses(drawn: Drawn) -> dict[str, np.ndarray]:
-    """By detector, AP on Basic less AP on Headless, as it is and on the draws."""
+    """By detector, AP on Basic minus AP on Headless, on the sample and on the draws."""
     cases = [case for case in drawn if case[0] == "basic"]
     return {case[1]: _values(drawn, case) - _values(drawn, ("headless", *case[1:])) for case in cases}
 
 
 def _shared_labels(basic: Annotations, headless: Annotations) -> dict[str, Annotations]:
-    """Both subsets with the labels only that the same person has in both."""
+    """Both subsets with only the labels that the same person has in both."""
     counted = [np.flatnonzero(~of.is_crowd) for of in (basic, headless)]
     _, *same = np.intersect1d(basic.ids[counted[0]], headless.ids[counted[1]], return_indices=True)
     rows = [of_subset[chosen] for of_subset, chosen in zip(counted, same, strict=True)]

@@ -1,7 +1,7 @@
 """Detectors compared on the HiCP subsets: one tidy table of metrics, and the loss without the head.
 
-Throughout, `truth` and `found` are as `hicp_lib.evaluation.cases` says. Crops of one source image are drawn
-together in the bootstrap.
+`truth` and `found` are always as described in `hicp_lib.evaluation.cases`. Crops of one source image are
+resampled together in the bootstrap.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,14 +20,14 @@ from hicp_lib.evaluation.matching import best_oks
 from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import Annotations, source_images
 
-# All groups an average precision is given for: hands as one object, and every hand by itself.
+# All groups with an AP: hands as one object, and every hand alone.
 GROUPS_OF_OBJECTS = (*GROUPS, "each hand")
 # (subset, detector, group) -> its evaluation, and its figures on draws that all detectors share
 Drawn = Mapping[tuple[str, str, str], tuple[Evaluation, Samples]]
 
 
 def compare(truth: Truth, found: Found, draws: Draws = Draws()) -> pd.DataFrame:
-    """AP and AR of every detector on every subset, for the groups of keypoints it gives.
+    """AP and AR of every detector on every subset, for its groups of keypoints.
 
     Parameters
     ----------
@@ -49,10 +49,9 @@ def compare(truth: Truth, found: Found, draws: Draws = Draws()) -> pd.DataFrame:
 def draw_cases(
     truth: Truth, found: Found, draws: Draws = Draws(), groups: Sequence[str] = tuple(GROUPS), **options: Any
 ) -> dict[tuple[str, str, str], tuple[Evaluation, Samples]]:
-    """Every case evaluated, as it is and on draws of source images: what `metric_table` and `pairs` read.
+    """Evaluate every case on the sample and on resamples of source images, for `metric_table` and `pairs`.
 
-    The detectors of one subset and group are drawn together, so that they can be told apart on the same
-    images.
+    The detectors of one subset and group share their resamples, so that they are compared on the same images.
 
     Parameters
     ----------
@@ -63,14 +62,14 @@ def draw_cases(
     draws : Draws, optional
         Of the bootstrap.
     groups : sequence of str, optional
-        Keys of `options.OBJECTS` that are looked at, where a detector gives such keypoints.
+        Keys of `options.OBJECTS` to evaluate, if a detector gives such keypoints.
     **options : str
         Fields of `options.Options`.
 
     Returns
     -------
     dict of (str, str, str) to (Evaluation, Samples)
-        By subset, detector and group: its evaluation, and its figures on the draws.
+        By subset, detector and group: the evaluation, and its metrics on the draws.
     """
     cases, drawn = list(all_cases(found, groups)), {}
     for subset, group in dict.fromkeys((subset, group) for subset, _, group in cases):
@@ -94,10 +93,10 @@ def metric_table(drawn: Drawn) -> pd.DataFrame:
 
 
 def pairs(drawn: Drawn) -> pd.DataFrame:
-    """AP and AR of every detector less every other's, on the same crops and the same draws of them.
+    """AP and AR of every detector minus every other's, on the same crops and resamples.
 
-    Two detectors stumble over the same pictures, so this says more of which is better than two intervals
-    side by side.
+    Detectors tend to fail on the same images, so this says more about which is better than two separate
+    intervals.
 
     Parameters
     ----------
@@ -144,9 +143,9 @@ def head_loss(drawn: Drawn) -> pd.DataFrame:
 
 
 def same_people(truth: Truth, found: Found) -> tuple[dict[str, Annotations], Found]:
-    """Basic and Headless with the people who are in both; further subsets as they are.
+    """Basic and Headless with only the people who are in both; further subsets unchanged.
 
-    Equal image ids are then of the same person, so that `draw_cases` draws the same people in both.
+    Equal image ids then mean the same person, so that `draw_cases` resamples the same people in both.
     """
     pair = ("basic", "headless")
     shared = truth["basic"].images.keys() & truth["headless"].images.keys()
@@ -178,7 +177,7 @@ def detection_times(runs: Mapping[tuple[str, str], Mapping[int, Timed]]) -> pd.D
 def person_oks(
     annotations: Annotations, detections: Mapping[int, Detections], group: str = "body", **options: Any
 ) -> pd.DataFrame:
-    """OKS of the best-fitting detection for each person who counts, 0 when nobody was found.
+    """OKS of the best detection of each evaluated person, 0 if there is none.
 
     Parameters
     ----------

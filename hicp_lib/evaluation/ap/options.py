@@ -1,30 +1,30 @@
-"""What COCO's protocol leaves open: whose keypoints count, how strictly, and what an object is.
+"""Open choices of COCO's protocol: which keypoints count, how strictly, and what an object is.
 
-The options say what tools and papers leave open or do differently; the defaults are the rules of
-COCO and COCO-WholeBody with Halpe's sigmas:
+The options cover what tools and papers leave open or do differently; the defaults are the rules of COCO and
+COCO-WholeBody with Halpe's sigmas:
 
 - `sigmas`: "halpe" (every hand keypoint .015) or "wholebody" (.017-.047); the body's 17 are the same.
 - `labelled`, the keypoints that count: "all" with a label, or "visible": those whose flag says so (2; COCO's
-  1 is occluded). Annotators leave many blank that they cannot see, rendered people have them all.
-- `outside`, keypoints known to lie outside the picture: "ignore" (OKS), or "count" (`extended_oks`: what has
-  a score of at least .5 is declared present, and giving a keypoint that is outside is wrong).
+  1 is occluded). Annotators leave many invisible keypoints unlabelled; rendered people have them all.
+- `outside`, keypoints known to lie outside the picture: "ignore" (OKS), or "count" (`extended_oks`: a
+  keypoint with a score of at least .5 is declared present, which is an error if it is outside).
 - `area`, the s² of OKS: "segment" (annotated), "box" (width x height), "box53" (0.53 of that, as tools
   do without segments), "source" (the segment before HiCP cut the head off; in HiCP folders only).
 - `unlabelled`, people without a labelled keypoint of the group: "ignore" (COCO: they do not count, and
-  detections in their surroundings are forgiven) or "drop" (as if not there: such detections are wrong).
+  detections near them are ignored) or "drop" (as if not there: such detections are false positives).
 - `absent`, detections without a keypoint of the group: "drop" (COCO-WholeBody) or "count" (the Halpe
   tool: each a false positive).
-- `others`, the other people in a HiCP crop: "ignore" (detections of them are forgiven) or "count" (wrong).
-- `score`, what detections are ranked by: "person", or "group": the mean score of the object's keypoints, 0
-  for one that is not given, as it adds 0 to OKS. Bodies go by the first; hands by the second, for the score
-  of a person is the body's (COCO-WholeBody ranks hands by it, too).
+- `others`, the other people in a HiCP crop: "ignore" (detections of them are ignored) or "count" (false
+  positives).
+- `score`, by which detections are ranked: "person", or "group": the mean score of the object's keypoints, 0
+  for a missing one, as it adds 0 to OKS. Bodies use the first; hands the second, since the score of a person
+  is that of the body (COCO-WholeBody nevertheless ranks hands by it).
 
 Both hands of a person are one object of 42 keypoints with sigma .015, as in the Halpe tool (AlphaPose's):
-with one of them missing its OKS is at most about .5. "each hand" is COCO-WholeBody's way: every hand an
-object of 21, found only on its own side, with that set's sigmas.
+with one of them missing its OKS is at most about .5. "each hand" follows COCO-WholeBody: every hand is an
+object of 21, matched only on its own side, with that data set's sigmas.
 
-A keypoint the detection does not give adds 0 to OKS. Crowds are ignored. The 20 best detections of an
-image take part.
+A missing keypoint adds 0 to OKS. Crowds are ignored. The 20 best detections of an image are used.
 """
 
 from collections.abc import Mapping
@@ -37,10 +37,10 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import GROUPS, HANDS
 from hicp_lib.formats.annotations import Annotations
 
-VISIBLE = 2  # COCO's flag; one that is labelled below is occluded
+VISIBLE = 2  # COCO's flag; labelled keypoints below it are occluded
 _HAND_OPTIONS = {"score": "group"}
 _EACH_HAND_OPTIONS = {"score": "group", "sigmas": "wholebody"}
-# What is found one by one, and how unless told otherwise: per group the keypoints of each object of a person.
+# Per group, the keypoints of each object of a person, and default options.
 OBJECTS: dict[str, tuple[np.ndarray, dict[str, str]]] = {
     "body": (GROUPS["body"][None], {}),
     "below the head": (GROUPS["body"][None, 5:], {}),
@@ -53,12 +53,12 @@ OBJECTS: dict[str, tuple[np.ndarray, dict[str, str]]] = {
 
 @dataclass(frozen=True)
 class Options:
-    """The choices of an evaluation; the module's text explains them.
+    """The options of an evaluation, explained in this module's docstring.
 
     Raises
     ------
     InputError
-        For a value that is not known.
+        For an unknown value.
 
     Examples
     --------
@@ -84,13 +84,13 @@ class Options:
 
 
 def definitions(annotations: Annotations, group: str) -> list[tuple[str, dict[str, str]]]:
-    """What belongs side by side: groups and options, the usual ones first.
+    """Definitions to report side by side: groups and options, the usual ones first.
 
-    Hands as one object and every hand by itself; all labelled keypoints and, where some are marked occluded,
-    the visible ones; where some are known to lie outside the picture, with these.
+    Hands as one object and every hand alone; all labelled keypoints and, if some are marked occluded, the
+    visible ones; if some are known to lie outside the picture, including these.
     """
     flags = annotations.visibility
-    occluded, outside = (flags > 0) & (flags < VISIBLE), flags < 0  # flags of 1 only do not tell
+    occluded, outside = (flags > 0) & (flags < VISIBLE), flags < 0  # all 1: no information
     groups = (group, "each hand") if group == "hand" else (group,)
     ways = [{"labelled": "all"}]
     ways += [{"labelled": "visible"}] if occluded.any() and (flags >= VISIBLE).any() else []
@@ -99,12 +99,12 @@ def definitions(annotations: Annotations, group: str) -> list[tuple[str, dict[st
 
 
 def choose(group: str, options: Mapping[str, Any]) -> tuple[np.ndarray, Options]:
-    """The keypoints of a group's objects, shape (n_objects, k), and the options given over its defaults.
+    """The keypoints of a group's objects, shape (n_objects, k), and its options with the given ones applied.
 
     Raises
     ------
     InputError
-        For a group that is not known.
+        For an unknown group.
     """
     if group not in OBJECTS:
         raise InputError(f"group {group!r}: expected one of {', '.join(OBJECTS)}")

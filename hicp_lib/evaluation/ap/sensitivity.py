@@ -1,4 +1,4 @@
-"""How average precision moves with what its definition leaves open."""
+"""Sensitivity of average precision to the open choices of its definition."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -16,7 +16,7 @@ from hicp_lib.formats.annotations import Annotations
 def sensitivity_table(
     annotations: Annotations, detections: Mapping[int, Detections], group: str = "body"
 ) -> pd.DataFrame:
-    """How the figures move when one option at a time leaves its default.
+    """Changes of the metrics when one option at a time is not at its default.
 
     Parameters
     ----------
@@ -30,8 +30,8 @@ def sensitivity_table(
     Returns
     -------
     DataFrame
-        Columns `changed` ("default", or e.g. "area=box"), those of `Evaluation.row`, and `AP_change` against
-        the default. What the annotations have nothing for is left out: area "source", points outside.
+        Columns `changed` ("default", or e.g. "area=box"), those of `Evaluation.row`, and `AP_change` from the
+        default. Options that the annotations do not support are left out: area "source", points outside.
     """
     counted = np.flatnonzero(~annotations.is_crowd)
     missing = set() if all("source_area" in annotations.extras[i] for i in counted) else {("area", "source")}

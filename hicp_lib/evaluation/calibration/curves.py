@@ -1,14 +1,14 @@
-"""Scores that mean the same: how often a keypoint of a given score is right, and scores made to say so.
+"""Calibration of scores: how often a keypoint with a given score is correct, and scores converted to that.
 
 The reliability of a detector's scores is the hit rate of its keypoints (see `keypoint_hits`) against the
-score (Niculescu-Mizil and Caruana, "Predicting good probabilities with supervised learning", ICML 2005);
-the expected calibration error is the mean distance between the two over bins of the score, weighted with
-the keypoints in them (Guo et al., "On calibration of modern neural networks", ICML 2017). The calibration
-is isotonic regression, the best monotone curve in the least-squares sense, so it never turns round which
-of two keypoints of a detector is the surer one.
+score (Niculescu-Mizil and Caruana, "Predicting good probabilities with supervised learning", ICML 2005); the
+expected calibration error is the mean distance between the two over bins of the score, weighted with the
+keypoints in them (Guo et al., "On calibration of modern neural networks", ICML 2017). The calibration is
+isotonic regression, the best monotone curve in the least-squares sense, so it never reverses the order of two
+keypoints of a detector.
 
-It is fitted on one half of the source images and judged on the other. Raw scores stay as they are, for
-thresholds as the paper has them; `Calibration.apply` makes new detections.
+It is fitted on one half of the source images and evaluated on the other. Raw scores are kept, for the paper's
+thresholds; `Calibration.apply` makes new detections.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ N_BINS = 10
 
 @dataclass(frozen=True)
 class Calibration:
-    """What the scores of a detector are worth.
+    """A calibration curve from scores to hit rates.
 
     Attributes
     ----------
     scores : array, shape (n,)
-        Rising.
+        Increasing.
     rates : array, shape (n,)
-        Not falling: hit rate at each of `scores`; linear between, level beyond.
+        Non-decreasing hit rates at `scores`; linear between, constant beyond.
 
     Examples
     --------
@@ -62,7 +62,7 @@ class Calibration:
         scores : array, shape (n,)
             Of keypoints whose truth is known.
         hits : array of bool, shape (n,)
-            Whether they are right.
+            Whether they are correct.
 
         Returns
         -------
@@ -75,20 +75,20 @@ class Calibration:
         """
         if not len(scores):
             raise InputError("no scored keypoints of labelled people; give more images to calibrate on")
-        # Equal scores are one point of the curve, or the order of rows would matter.
+        # Equal scores become one point of the curve; otherwise the order of rows would matter.
         levels, place, counts = np.unique(scores, return_inverse=True, return_counts=True)
         rates = isotonic_regression(np.bincount(place, weights=hits) / counts, weights=counts).x
-        # Of each level stretch the curve needs only the ends.
+        # Of each constant segment the curve needs only the ends.
         inner = np.zeros(len(levels), dtype=bool)
         inner[1:-1] = (rates[1:-1] == rates[:-2]) & (rates[1:-1] == rates[2:])
         return cls(levels[~inner], np.clip(rates[~inner], 0, 1))
 
     def __call__(self, scores: np.ndarray) -> np.ndarray:
-        """Hit rates to expect at scores of any shape."""
+        """Expected hit rates at scores of any shape."""
         return np.interp(scores, self.scores, self.rates)
 
     def apply(self, found: Detections, group: str) -> Detections:
-        """The detections with a group's keypoint scores calibrated; a keypoint not given keeps 0."""
+        """The detections with a group's keypoint scores calibrated; a missing keypoint keeps 0."""
         keypoints = GROUPS[group]
         given = np.isfinite(found.keypoints_px[:, keypoints]).all(axis=-1)
         scores = found.scores.copy()
@@ -102,7 +102,7 @@ def split_half(groups: pd.Series, seed: int = 0) -> np.ndarray:
     Parameters
     ----------
     groups : Series, shape (n,)
-        Source image of each row; rows of one are never on both sides.
+        Source image of each row; rows of one image are never on both sides.
     seed : int, optional
         Of the draw.
 
@@ -124,7 +124,7 @@ def split_half(groups: pd.Series, seed: int = 0) -> np.ndarray:
 def calibration_study(
     hits: pd.DataFrame, draws: Draws = Draws()
 ) -> tuple[pd.DataFrame, pd.DataFrame, dict[tuple[str, str], Calibration]]:
-    """Fit a calibration per detector and group on half of the source images, judge it on the other half.
+    """Fit a calibration per detector and group on half of the source images, evaluate it on the other half.
 
     A detector without scored keypoints in both halves is left out.
 
@@ -133,7 +133,7 @@ def calibration_study(
     hits : DataFrame
         `keypoint_hits.all_hits`, or rows of `keypoint_hits` with columns `detector, group, source_image`.
     draws : Draws, optional
-        Of the bootstrap; its seed draws the half too.
+        Of the bootstrap; its seed also selects the half.
 
     Returns
     -------
@@ -168,7 +168,7 @@ def calibration_study(
 
 
 def calibration_table(calibrations: Mapping[tuple[str, str], Calibration]) -> pd.DataFrame:
-    """Calibrations to be saved: columns `detector, group, score, rate`, a row per corner of a curve."""
+    """Calibrations as a table: columns `detector, group, score, rate`, a row per corner of a curve."""
     points = ((case, zip(its.scores, its.rates, strict=True)) for case, its in calibrations.items())
     rows = [(*case, *point) for case, of_case in points for point in of_case]
     return pd.DataFrame(rows, columns=["detector", "group", "score", "rate"])
@@ -181,7 +181,7 @@ def calibrations_of(table: pd.DataFrame) -> dict[tuple[str, str], Calibration]:
 
 
 def _errors(kinds: Mapping[str, pd.DataFrame], draws: Draws) -> Iterator[float]:
-    """Value and interval of each kind's calibration error and, on the same draws, of their difference."""
+    """Value and interval of each kind's calibration error and, on the same resamples, of their difference."""
     samples = []
     for rows in kinds.values():
         sums = _sums(rows["score"], rows["hit"], rows["source_image"])
@@ -210,7 +210,7 @@ def reliability(
     Returns
     -------
     DataFrame
-        One row per bin that holds keypoints, columns `bin` (0-9), `score` (mean), `rate, low, high, count`.
+        One row per non-empty bin, columns `bin` (0-9), `score` (mean), `rate, low, high, count`.
     """
     sums = _sums(scores, hits, groups)
     count, score_sum, _ = sums.sum(axis=0)
@@ -233,7 +233,7 @@ def _sums(scores: np.ndarray, hits: np.ndarray, groups: np.ndarray) -> np.ndarra
 
 
 def _resampled(sums: np.ndarray, draws: Draws) -> np.ndarray:
-    """Sums (1 + draws, 3, 10) of all groups, then of groups drawn with replacement."""
+    """Sums (1 + draws, 3, 10) of all groups, then of groups resampled with replacement."""
     return np.tensordot(draw_counts(len(sums), draws), sums, axes=1)
 
 

@@ -1,7 +1,7 @@
 """Calibrations as files: fitted to one result file, applied to others of the same detector.
 
 The table is the one the report saves: columns `detector, group, score, rate`, a row per corner of a curve
-(`calibration.calibration_table`), as Parquet there and as CSV here.
+(`hicp_lib.evaluation.calibration.curves.calibration_table`), as Parquet there and as CSV here.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ from hicp_lib.evaluation.calibration.keypoint_hits import keypoint_hits
 from hicp_lib.formats.annotations import Annotations, read_detections, write_detections
 
 RAW_SCORES = "raw_keypoint_scores"
-_ROUNDING = 1e-12  # by which a rate may fall
+_ROUNDING = 1e-12  # by which a rate may decrease
 _COLUMNS = ["detector", "group", "score", "rate"]
 _KNOWN_KEYS = {"image_id", "category_id", "keypoints", "score"}
 
@@ -28,9 +28,9 @@ _KNOWN_KEYS = {"image_id", "category_id", "keypoints", "score"}
 def fit_calibrations(
     annotations: Annotations, detections: Mapping[int, Detections], detector: str
 ) -> tuple[pd.DataFrame, dict[str, int]]:
-    """Calibration of every group of keypoints the detections give.
+    """Fit a calibration for every group of keypoints in the detections.
 
-    Fitted to all annotated images: do not evaluate what comes of it on the same ones.
+    It uses all annotated images: do not evaluate calibrated scores on the same ones.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def fit_calibrations(
     table : DataFrame
         As of `hicp_lib.evaluation.calibration.curves.calibration_table`.
     counts : dict of str to int
-        By group, the keypoints its calibration was fitted to.
+        By group, the number of keypoints used for the fit.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def read_calibrations(path: str | Path, detector: str = "") -> dict[str, Calibra
     path : str or Path
         CSV, or Parquet where the name ends in `.parquet`.
     detector : str, optional
-        Its name; may be empty where the file has no other.
+        Its name; may be empty if the file has only one.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def read_calibrations(path: str | Path, detector: str = "") -> dict[str, Calibra
     Raises
     ------
     InputError
-        If the file is unreadable, is no table of calibrations, or does not tell whose to take.
+        If the file is unreadable, is not a table of calibrations, or the detector is ambiguous.
     """
     path = Path(path)
     table = read_table(path, _COLUMNS)
@@ -114,10 +114,10 @@ def _check(path: Path, table: pd.DataFrame) -> None:
 def apply_calibrations(
     detections_path: str | Path, calibrations: Mapping[str, Calibration], out: str | Path
 ) -> int:
-    """Write a result file with calibrated keypoint scores, the scores as they were beside.
+    """Write a result file with calibrated keypoint scores, keeping the original ones.
 
-    A file that holds an importer's `raw_keypoint_scores` keeps those. Keypoints of groups without a
-    calibration keep their scores, and people theirs: AP ranks people and stays as it was.
+    An importer's `raw_keypoint_scores` are kept. Keypoints of groups without a calibration keep their scores,
+    and so do people: AP ranks people and does not change.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""Keypoints that are right: found ones whose truth is known, and whether they hit it.
+"""Hits: whether detected keypoints with known truth are correct.
 
-A keypoint is a *hit* when its term of OKS is at least `HIT_TERM`, if nothing else is said (see `oks`).
+A keypoint is a *hit* when its term of OKS is at least `HIT_TERM`, or another given value (see `oks`).
 """
 
 from collections.abc import Iterator, Mapping
@@ -18,7 +18,7 @@ from hicp_lib.evaluation.matching import match_best_first, pairwise_oks
 from hicp_lib.formats.annotations import Annotations
 
 HIT_TERM = 0.5
-_ANY_OKS = float(np.nextafter(0.0, 1.0))  # the least above 0
+_ANY_OKS = float(np.nextafter(0.0, 1.0))  # the smallest number above 0
 
 
 def all_hits(
@@ -33,9 +33,9 @@ def all_hits(
     found : Found
         By image id, of every subset and detector.
     groups : mapping of str to tuple of str
-        The groups of keypoints of each detector that are looked at.
+        The groups of keypoints of each detector to include.
     min_term : float, optional
-        A hit's least term of OKS.
+        A hit's minimum term of OKS.
 
     Returns
     -------
@@ -52,11 +52,11 @@ def keypoint_hits(
     sigmas: str = "halpe",
     min_term: float = HIT_TERM,
 ) -> pd.DataFrame:
-    """Which found keypoints are hits, for those whose truth is known.
+    """Which detected keypoints are hits, for those with known truth.
 
-    Detections, best first, take the free annotated person they fit best by OKS. Keypoints without a label
-    there have no truth and are left out, and so are detections of people who do not count (crowds, others,
-    nobody labelled). A detection that fits nobody at all is wrong with every keypoint.
+    Detections, best first, are matched to the free annotated person with the highest OKS. Keypoints without a
+    label have no known truth and are left out, and so are detections of people who are not evaluated (crowds,
+    others, people without labels). All keypoints of an unmatched detection are wrong.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def keypoint_hits(
     sigmas : {"halpe", "wholebody"}
         Constants of the keypoints.
     min_term : float, optional
-        A hit's least term of OKS.
+        A hit's minimum term of OKS.
 
     Returns
     -------

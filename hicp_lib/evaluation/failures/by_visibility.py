@@ -1,4 +1,4 @@
-"""AP and AR by which parts of a person a picture shows (the paper's section IV-D)."""
+"""AP and AR by the visible parts of a person (the paper's section IV-D)."""
 
 from dataclasses import replace
 
@@ -15,8 +15,8 @@ from hicp_lib.formats.annotations import Annotations, ImageInfo
 def compare_classes(truth: Truth, found: Found, draws: Draws = Draws()) -> pd.DataFrame:
     """AP and AR per class and detector, and their differences, over the crops of all subsets together.
 
-    Every image shows one person who counts, as HiCP's crops do. Crops of one source image, in whatever
-    subset, are drawn together in the bootstrap.
+    Every image must have one evaluated person, like HiCP's crops. Crops of one source image, in any subset,
+    are resampled together in the bootstrap.
 
     Parameters
     ----------
@@ -30,9 +30,9 @@ def compare_classes(truth: Truth, found: Found, draws: Draws = Draws()) -> pd.Da
     Returns
     -------
     DataFrame
-        As `metric_table.metric_table`, with the class in the place of `subset`, and columns `other, pair`: ""
-        for a detector's own figures, then those of `metric_table.pairs`. With fewer than `MIN_PEOPLE` people
-        who count, figures are NaN.
+        As `metric_table.metric_table`, with the class instead of `subset`, and columns `other, pair`: "" for
+        a detector's own metrics, then those of `metric_table.pairs`. With fewer than `MIN_PEOPLE` evaluated
+        people, values are NaN.
     """
     classes = people_classes(truth)
     people, detections = pooled(truth, found)
@@ -64,7 +64,7 @@ def pooled(truth: Truth, found: Found) -> tuple[Annotations, dict[str, dict[int,
     Returns
     -------
     people : Annotations
-        Of all subsets, numbered anew.
+        Of all subsets, renumbered.
     detections : dict of str to dict of int to Detections
         By detector and image id.
     """

@@ -1,8 +1,7 @@
-"""How detection falls with the dose of what makes it hard: varied on purpose, or as found in a data set.
+"""Detection as a function of the dose of a difficulty: varied on purpose, or as found in a data set.
 
-Varied on purpose (`hicp_lib.experiments.doses`), everything but the dose is the same. In a data
-set doses come together: who is near is cropped as well. There a curve shows what goes with a dose, not what
-the dose does.
+When varied on purpose (`hicp_lib.experiments.doses`), everything but the dose is the same. In a data set
+doses are correlated: people who are near are also cropped. There a curve shows correlation, not causation.
 """
 
 from collections.abc import Mapping
@@ -29,7 +28,7 @@ OBSERVED += ("share of keypoints hidden", "distance to the border", "brightness"
 
 
 def by_level(annotations: Annotations) -> dict[tuple[str, float], Annotations]:
-    """The pictures of each dose and level; people carry both."""
+    """The images of each dose and level, which are keys of the people."""
     table = pd.DataFrame(annotations.extras)[["dose", "level"]].assign(image_id=annotations.image_ids)
     groups = table.groupby(["dose", "level"], sort=False)["image_id"]
     return {level: annotations.of_images(set(image_ids)) for level, image_ids in groups}
@@ -43,7 +42,7 @@ def dose_curves(
     Parameters
     ----------
     annotations : Annotations
-        As `doses.open_doses` writes them.
+        As from `doses.open_doses`.
     found : mapping of str to mapping of int to Detections
         By image id, of every detector.
     draws : Draws, optional
@@ -71,7 +70,7 @@ def dose_curves(
 
 
 def observed_doses(truth: Truth, folders: Mapping[str, Path], source: Annotations) -> pd.DataFrame:
-    """The doses of everybody who counts, as the data set has them: one row per labelled body keypoint.
+    """The doses of each evaluated person in a data set: one row per labelled body keypoint.
 
     Parameters
     ----------
@@ -80,12 +79,12 @@ def observed_doses(truth: Truth, folders: Mapping[str, Path], source: Annotation
     folders : mapping of str to Path
         By subset, the folder with their images.
     source : Annotations
-        What the crops were made from; distances are known if people carry `distance_m`.
+        What the crops were made from; distances are known if people have `distance_m`.
 
     Returns
     -------
     DataFrame
-        Columns `subset, image_id, keypoint` and those of `OBSERVED` (NaN where not known).
+        Columns `subset, image_id, keypoint` and those of `OBSERVED` (NaN if unknown).
     """
     extras = zip(source.ids.tolist(), source.extras, strict=True)
     distances_m = {i: extra.get("distance_m", np.nan) for i, extra in extras}
@@ -114,7 +113,7 @@ def observed_doses(truth: Truth, folders: Mapping[str, Path], source: Annotation
 
 
 def observed_curves(errors: pd.DataFrame, observed: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
-    """Share of body keypoints hit, by five bins of each dose that hold equally many keypoints.
+    """Share of body keypoints hit, in five bins of each dose with equal numbers of keypoints.
 
     Parameters
     ----------

@@ -1,18 +1,19 @@
 """Kinds of localisation error, after Ronchi and Perona ("Benchmarking and error diagnosis in multi-instance
 pose estimation", ICCV 2017).
 
-The similarity of a keypoint to a place is its term of OKS. A keypoint of a detection matched to a person is
+The similarity of a keypoint to a position is its term of OKS. A keypoint of a detection matched to a person
+is
 
 - *good* when its similarity to the truth is at least .85,
 - *jitter* when it is at least .5,
-- an *inversion* when, otherwise, it is similar (at least .5) to the same person's keypoint of the other side,
-- a *swap* when it is similar to that keypoint, or the other side's, of somebody else in the image,
+- otherwise an *inversion* when it is similar (at least .5) to the same person's keypoint of the other side,
+- a *swap* when it is similar to that keypoint, or the other side's, of another person in the image,
 - a *miss* when it is similar to none of these.
 
-Where an inversion and a swap are both possible the more similar one counts. The paper judges keypoints of
-detections; here every labelled keypoint of a person who counts has a row, so two more kinds tell of those
-there is nothing to judge: *not given* by a detection that matches the person, and *not found* when no
-detection does (an OKS of .1 is asked for, as in the paper).
+If an inversion and a swap are both possible, the more similar one is chosen. The paper classifies keypoints
+of detections; here every labelled keypoint of an evaluated person has a row, so there are two more kinds:
+*not given* by a detection that matches the person, and *not found* when no detection does (with an OKS of .1
+or more, as in the paper).
 """
 
 from collections.abc import Mapping
@@ -44,7 +45,7 @@ def all_errors(truth: Truth, found: Found) -> pd.DataFrame:
 def keypoint_errors(
     annotations: Annotations, detections: Mapping[int, Detections], group: str = "body", sigmas: str = "halpe"
 ) -> pd.DataFrame:
-    """What became of every labelled keypoint of the people who count.
+    """The kind of error of every labelled keypoint of the evaluated people.
 
     Parameters
     ----------
@@ -60,9 +61,8 @@ def keypoint_errors(
     Returns
     -------
     DataFrame
-        Columns `image_id, annotation_id, keypoint` (Halpe index), `visibility`, `score` (NaN where there is
-        none), `term` (of OKS, 0 where there is none), `kind` (categorical, `KINDS`), `hit` (bool: good or
-        jitter).
+        Columns `image_id, annotation_id, keypoint` (Halpe index), `visibility`, `score` (NaN if missing),
+        `term` (of OKS, 0 if missing), `kind` (categorical, `KINDS`), `hit` (bool: good or jitter).
 
     Raises
     ------
@@ -91,7 +91,7 @@ def _judge(
     people: Annotations, person: int, found: Detections, row: int | None, keypoints: np.ndarray,
     sigmas: np.ndarray,
 ) -> pd.DataFrame:  # fmt: skip
-    """A person's labelled keypoints, by what detection `row` makes of them."""
+    """Classify a person's labelled keypoints in detection `row`."""
     labelled = people.visibility[person, keypoints] > 0
     at, other_side = keypoints[labelled], _OTHER_SIDE[keypoints[labelled]]
     points_px, scores = np.full((len(at), 2), np.nan), np.full(len(at), np.nan)
@@ -100,7 +100,7 @@ def _judge(
     given = np.isfinite(points_px).all(axis=-1)
     sides_px = np.where((other_side != at)[:, None], people.keypoints_px[:, other_side], np.nan)
     places_px = people.keypoints_px[:, at], sides_px
-    # Similarity (n, k) to everybody's own points, and to those of their other side.
+    # Similarity (n, k) to all people's own points, and to those of their other side.
     own, other = (oks_terms(points_px - of, people.areas_px2, sigmas[labelled]) for of in places_px)
     others = np.maximum(own, other)[np.arange(len(people)) != person].max(axis=0, initial=0.0)
     term, is_inverted = own[person], (other[person] >= NEAR_TERM) & (other[person] >= others)
@@ -114,14 +114,14 @@ def _judge(
 
 
 def kind_proportions(errors: pd.DataFrame, by: str) -> pd.DataFrame:
-    """Proportion of each kind, every one listed; NaN where there are fewer than `MIN_PEOPLE` people.
+    """Proportion of every kind; NaN with fewer than `MIN_PEOPLE` people.
 
     Parameters
     ----------
     errors : DataFrame
         `all_errors`, with the column `by`.
     by : str
-        Column that makes the groups, besides detector and group of keypoints.
+        Column to group by, in addition to detector and group of keypoints.
 
     Returns
     -------
@@ -131,7 +131,7 @@ def kind_proportions(errors: pd.DataFrame, by: str) -> pd.DataFrame:
     Raises
     ------
     InputError
-        If the errors have no column of that name.
+        If the errors have no such column.
     """
     if by not in errors:
         raise InputError(f"kinds of error by {by!r}: expected one of {', '.join(errors.columns)}")

@@ -1,14 +1,15 @@
-"""Scores of keypoints that are not there to be seen, and the paper's remarks on them as numbers.
+"""Scores of keypoints that are not visible, and the paper's remarks about them as measures.
 
-What the paper says of each system in a few words becomes a measure that every detector can be held to:
+Each of the paper's short remarks about a system becomes a measure that is computed for every detector:
 
-- MMPose "adds keypoints at the edge with low confidence": of keypoints outside the picture, the share that
-  is given; of those given, the share put at the border or beyond; their mean score less visible ones'.
+- MMPose "adds keypoints at the edge with low confidence": of keypoints outside the picture, the share that is
+  given; of those given, the share placed at the border or beyond; their mean score minus that of visible
+  ones.
 - AlphaPose is "conservative": the share of labelled keypoints given with a score of at least .3, and the
-  share of those that are right.
-- Detectron2 has "low shoulder scores": mean score of visible shoulders less that of other visible keypoints
+  share of those that are correct.
+- Detectron2 has "low shoulder scores": mean score of visible shoulders minus that of other visible keypoints
   below the head.
-- OpenPose gives "fingers only with a wrist": of hands given, the share whose body wrist is not given.
+- OpenPose gives "fingers only with a wrist": of given hands, the share whose body wrist is not given.
 """
 
 from collections.abc import Iterator
@@ -32,12 +33,12 @@ _FIRST_BELOW_HEAD = INDEX["left_shoulder"]
 
 _NOTHING = (np.nan, np.nan, np.nan, 0)  # value, interval and number of rows where there are none
 
-# Measure: the system that the paper says it of.
+# Measure: the system that the paper's remark is about.
 MEASURES = {said.format(sure=SURE): of for said, of in read_json(DATA_DIR / "paper.json")["remarks"].items()}
 
 
 def scores_by_state(placed: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
-    """Hit rate against score, for keypoints that are visible, hidden and outside the picture.
+    """Hit rate against score, for keypoints that are visible, occluded and outside the picture.
 
     Parameters
     ----------
@@ -63,7 +64,7 @@ def scores_by_state(placed: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFram
 def paper_remarks(
     placed: pd.DataFrame, errors: pd.DataFrame, truth: Truth, found: Found, draws: Draws = Draws()
 ) -> pd.DataFrame:
-    """Every measure for every detector that was run, and "not run" for the system the paper says it of.
+    """Every measure for every detector that was run, and "not run" for a remark's system if it was not.
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ def _mean(rows: pd.DataFrame, flags: pd.Series, draws: Draws) -> tuple[float, fl
 
 
 def _difference(a: pd.DataFrame, b: pd.DataFrame, draws: Draws) -> tuple[float, float, float, int]:
-    """Mean score of a less that of b, both on the same draws of source images."""
+    """Mean score of a minus that of b, both on the same resamples of source images."""
     images = np.unique(np.concatenate([a["source_image"], b["source_image"]]))
     if not len(a) or not len(b):
         return _NOTHING

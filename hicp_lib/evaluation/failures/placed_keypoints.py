@@ -1,8 +1,8 @@
-"""What a detector does with keypoints that are hidden or outside the picture.
+"""How detectors treat keypoints that are occluded or outside the picture.
 
-A crop cuts people off, but the image it was cut from knows where the rest of them is. So of a keypoint that
-is not in the picture it can be said, too, whether a detector gives it, how surely, where it puts it, and
-whether that is right. Bodies only: the 17 keypoints all detectors share.
+A crop truncates people, but in the source image the rest of them is labelled. So for a keypoint outside the
+crop, too, it is known whether a detector gives it, with which score, where, and whether that is correct.
+Bodies only: the 17 keypoints that all detectors share.
 """
 
 from collections.abc import Mapping
@@ -19,10 +19,10 @@ from hicp_lib.evaluation.cases import Found, Truth
 from hicp_lib.evaluation.matching import matched_people
 from hicp_lib.formats.annotations import Annotations, source_images
 
-# Where a keypoint truly is: in the picture and visible, in the picture but hidden, outside the picture, or
-# nowhere known (not labelled in the source image).
+# True state of a keypoint: visible in the picture, occluded in the picture, outside the picture, or unknown
+# (not labelled in the source image).
 STATES = ("visible", "hidden", "outside", "unknown")
-BORDER = 0.05  # of the picture's side: what counts as at its border
+BORDER = 0.05  # fraction of the picture's side that counts as its border
 _SIGMAS = SIGMAS["halpe"][COCO_17]
 _DTYPES = {
     "subset": str, "detector": str, "image_id": int, "source_image": int, "cut_side": str, "keypoint": int,
@@ -31,12 +31,12 @@ _DTYPES = {
 
 
 def placed_keypoints(truth: Truth, found: Found, source: Annotations) -> pd.DataFrame:
-    """The 17 keypoints of every detection matched to a person who counts (`matching.matched_people`).
+    """The 17 keypoints of every detection matched to an evaluated person (`matching.matched_people`).
 
     Parameters
     ----------
     truth : Truth
-        Of crops, by subset; people name their `source_id` and `crop_px`.
+        Of crops, by subset; people have `source_id` and `crop_px`.
     found : Found
         By image id, of every subset and detector.
     source : Annotations
@@ -46,9 +46,8 @@ def placed_keypoints(truth: Truth, found: Found, source: Annotations) -> pd.Data
     -------
     DataFrame
         Columns `subset, detector, image_id, source_image, cut_side` (empty outside Headless), `keypoint,
-        state` (one of `STATES`), `given, score` (NaN where not given), `x, y` (where it was put, from 0 at
-        the left or top border to 1 at the other), `hit` (OKS term of at least .5; NaN where not given or
-        unknown).
+        state` (one of `STATES`), `given, score` (NaN if not given), `x, y` (its given position, from 0 at the
+        left or top border to 1 at the other), `hit` (OKS term of at least .5; NaN if not given or unknown).
     """
     seen = {subset: with_outside(people, source) for subset, people in truth.items()}
     parts = [_of_case(seen[subset], run, subset, detector) for (subset, detector), run in found.items()]
@@ -56,7 +55,7 @@ def placed_keypoints(truth: Truth, found: Found, source: Annotations) -> pd.Data
 
 
 def _of_case(people: Annotations, run: Mapping[int, Detections], subset: str, detector: str) -> pd.DataFrame:
-    """What one detector's matched detections make of the people of one subset."""
+    """The rows of one detector on one subset."""
     rows_of = pd.Series(range(len(people))).groupby(people.image_ids).indices
     pairs = [
         (rows_of[image_id][person], detections, row)
@@ -93,7 +92,7 @@ def _of_case(people: Annotations, run: Mapping[int, Detections], subset: str, de
 
 
 def landed(placed: pd.DataFrame) -> pd.Series:
-    """Where given keypoints were put: "outside" the picture, "at the border" or "inside"."""
+    """Where given keypoints are: "outside" the picture, "at the border" or "inside"."""
     x, y = placed["x"], placed["y"]
     depth = np.minimum(np.minimum(x, 1 - x), np.minimum(y, 1 - y))
     place = np.select([depth < 0, depth < BORDER], ["outside", "at the border"], "inside")
@@ -101,10 +100,10 @@ def landed(placed: pd.DataFrame) -> pd.Series:
 
 
 def from_the_cut(placed: pd.DataFrame) -> pd.DataFrame:
-    """Places in Headless turned so that the head was cut off above: columns `along`, `below`.
+    """Positions in Headless, rotated so that the cut is at the top: columns `along`, `below`.
 
     `along` runs from 0 to 1 along the cut and `below` from 0 at the cut to 1 at the far side; it is negative
-    where the picture has been cut away.
+    in the removed part.
     """
     x, y, side = placed["x"], placed["y"], placed["cut_side"]
     along = np.where(side.isin(["top", "bottom"]), x, y)

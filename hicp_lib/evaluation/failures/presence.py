@@ -1,13 +1,13 @@
-"""Is it there at all? Keypoints declared present by calibrated scores, and what extended OKS makes of them.
+"""Presence: keypoints declared present by calibrated scores, and their extended OKS.
 
-A keypoint that is given inside the picture is *declared present* when its score, or better what that score
-is worth, reaches a cut; one placed outside the picture declares itself absent. What a score is worth is an
-isotonic curve (`calibration.curves`) of how often a keypoint placed in the picture is in the picture at all,
-for each detector and part of the body. It is cross-fitted: source images are split into two halves, and a
-person is judged by the curve of the half they are not in. It holds for people cut off as often as in these
-data.
+A keypoint that is given inside the picture is *declared present* when its score, or better its calibrated
+score, reaches a threshold; one placed outside the picture is declared absent. The calibration is an isotonic
+curve (`calibration.curves`) of how often a keypoint placed in the picture really is in the picture, for each
+detector and part of the body. It is cross-fitted: source images are split into two halves, and each person is
+evaluated with the curve fitted on the other half. It is valid for people truncated as often as in these data.
 
-`false_presence` counts parts of people that are outside the picture, and are given inside it all the same.
+`false_presence` is the hallucination rate: of parts of people outside the picture, the share that a detector
+nevertheless gives inside it.
 """
 
 from collections.abc import Callable
@@ -31,30 +31,30 @@ from hicp_lib.evaluation.statistics.proportions import proportions
 from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import Annotations, source_images
 
-# Of each of the 17 keypoints, the part of the body: the head, or what a pair of keypoints is called.
+# The body part of each of the 17 keypoints: the head, or the name of a pair of keypoints.
 PART_OF = np.array(["head"] * 5 + [name.partition("_")[2] for name in COCO_NAMES[5:]])
 PARTS = tuple(dict.fromkeys(PART_OF))
 MEASURES = ("OKS", "extended OKS, all given", "extended OKS, decided", "gained by deciding")
 
 
 Presence = Callable[[str, object, np.ndarray], np.ndarray]
-"""How probably what a detector placed in a picture is in it, by its source image and scores (..., 17)."""
+"""Probability that a placed keypoint is in the picture, by detector, source image, scores (..., 17)."""
 
 
 def fit_presence(placed: pd.DataFrame, seed: int = 0) -> Presence:
-    """What scores say of whether a keypoint is in the picture, by the half that its source image is not in.
+    """Fit the probability that a keypoint is in the picture, per half of the source images.
 
     Parameters
     ----------
     placed : DataFrame
         `placed_keypoints.placed_keypoints`.
     seed : int, optional
-        Of the split of the source images.
+        Seed of the split of the source images.
 
     Returns
     -------
     callable
-        As `Presence` says; the scores of a part without a curve are kept.
+        A `Presence`; the scores of a part without a curve are kept.
     """
     in_picture = placed["given"] & (landed(placed) != "outside")
     rows = placed[in_picture & (placed["state"] != "unknown")]
@@ -78,7 +78,7 @@ def fit_presence(placed: pd.DataFrame, seed: int = 0) -> Presence:
 
 
 def declared(truth: Truth, found: Found, presence: Presence | None = None) -> Found:
-    """Detections whose body keypoints' scores say how probably each is in the picture.
+    """Detections whose body keypoints' scores are probabilities of being in the picture.
 
     Parameters
     ----------
@@ -87,13 +87,12 @@ def declared(truth: Truth, found: Found, presence: Presence | None = None) -> Fo
     found : Found
         By image id, of every subset and detector.
     presence : callable, optional
-        As `Presence` says: what scores are worth; when left out, whatever is given is declared present,
-        with score 1.
+        A `Presence`; by default every given keypoint is declared present, with score 1.
 
     Returns
     -------
     Found
-        As `found`; a keypoint placed outside the picture has score 0: it declares itself absent.
+        As `found`; a keypoint placed outside the picture gets score 0: it is declared absent.
     """
     result: dict[tuple[str, str], dict[int, Detections]] = {}
     for (subset, detector), run in found.items():
@@ -124,13 +123,13 @@ def extended_table(
     drawn : Drawn
         From `draw_cases` of the same.
     draws : Draws, optional
-        Of the bootstrap; its seed draws the halves too.
+        Of the bootstrap; its seed also selects the halves.
 
     Returns
     -------
     DataFrame
         Columns `subset, detector, measure` (of `MEASURES`), `value, low, high, n_people`; the last measure is
-        the third less the second, on the same draws.
+        the third minus the second, on the same resamples.
     """
     presence = fit_presence(placed_keypoints(truth, found, source), draws.seed)
     ways = {"given": declared(truth, found), "decided": declared(truth, found, presence)}
@@ -150,7 +149,7 @@ def extended_table(
     return pd.DataFrame(rows, columns=columns)
 
 
-# What counts as given: the paper's threshold on scores as they come, or on what they are worth.
+# When a keypoint counts as given: the paper's threshold on raw scores, or a threshold on calibrated ones.
 DECISIONS = (f"score of at least {SURE}", f"calibrated score of at least {PRESENCE_CUT}")
 _FIRST_OF_PAIRS = 5  # the keypoints before are the head's
 
@@ -158,10 +157,10 @@ _FIRST_OF_PAIRS = 5  # the keypoints before are the head's
 def false_presence(
     truth: Truth, found: Found, placed: pd.DataFrame, source: Annotations, draws: Draws = Draws()
 ) -> pd.DataFrame:
-    """How often parts of people that are outside the picture are given inside it.
+    """Hallucination rate: how often parts of people outside the picture are given inside it.
 
-    A head is outside when no keypoint of it is in the picture and one is known to be outside, and it is given
-    when one of its keypoints is. All other parts are one keypoint each, on either side.
+    A head is outside when none of its keypoints is in the picture and at least one is known to be outside; it
+    is given when one of its keypoints is. All other parts are one keypoint each, on either side.
 
     Parameters
     ----------
@@ -174,14 +173,14 @@ def false_presence(
     source : Annotations
         What the crops were made from.
     draws : Draws, optional
-        Of the bootstrap; its seed draws the halves too.
+        Of the bootstrap; its seed also selects the halves.
 
     Returns
     -------
     DataFrame
         Columns `subset, detector, part` (of `PARTS`), `decision` (of `DECISIONS`), `value` (share of the
         parts outside), `low, high` (95 %, over source images), `n` (parts outside), `n_images, n_found`
-        (those of people whom a detection fits; of the others none is given).
+        (those of detected people; of the others none is given).
     """
     calibrated = declared(truth, found, fit_presence(placed, draws.seed))
     kinds = {SURE: placed, PRESENCE_CUT: placed_keypoints(truth, calibrated, source)}

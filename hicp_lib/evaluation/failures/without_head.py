@@ -1,4 +1,4 @@
-"""The head's part in it: what changes for each keypoint when the head is cut off, and heads hallucinated."""
+"""Effect of the head: the change of each keypoint when the head is cut off, and hallucinated heads."""
 
 import pandas as pd
 
@@ -41,7 +41,7 @@ def change_per_keypoint(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.Data
     -------
     DataFrame
         Columns `detector, keypoint` (name), `basic, headless, change, low, high, n` (pairs), `n_images`; the
-        interval is the change's, over source images.
+        interval is that of the change, over source images.
     """
     by = ["detector", "keypoint"]
     both = with_and_without_head(errors)
@@ -55,7 +55,7 @@ def change_per_keypoint(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.Data
 
 
 def hallucinated_heads(placed: pd.DataFrame) -> pd.DataFrame:
-    """Head keypoints given in Headless, where there are none: the rows of `placed_keypoints` for them.
+    """Head keypoints given in Headless, where there is no head: their rows of `placed_keypoints`.
 
     Further columns: `landed`, and `along`, `below` as from `from_the_cut`.
     """

@@ -1,14 +1,13 @@
-"""The worst cases of each detector, found by rule.
+"""The worst cases of each detector, selected by rule.
 
-- *Surest mistakes*: people for whom the scores of wrong keypoints (inversion, swap or miss), added up, are
-  highest.
-- *Overlooked*: people with the most visible keypoints whom no detection fits (an OKS of .1 is asked for; a
-  body found with left and right exchanged throughout may not reach it).
+- *Surest mistakes*: people with the highest sum of scores of wrong keypoints (inversion, swap or miss).
+- *Overlooked*: people with the most visible keypoints whom no detection matches (with an OKS of .1 or more; a
+  body detected with left and right exchanged may not reach it).
 
-- *Lost close by* (`lost_points`): the keypoint that a detector is surest of among those that it places well
-  on a person with a head and not on the same person without, though it finds the person in both.
+- *Lost close by* (`lost_points`): the keypoint with the highest score among those that a detector places well
+  on a person with a head, but not on the same person without, though it finds the person in both.
 
-Equal cases follow in the order of their ids; of each source image only the worst case counts.
+Equal cases are ordered by their ids; of each source image only the worst case is used.
 """
 
 import numpy as np
@@ -53,7 +52,7 @@ def worst_cases(errors: pd.DataFrame, n: int = 4) -> pd.DataFrame:
 
 
 def lost_points(errors: pd.DataFrame) -> pd.DataFrame:
-    """The keypoint that each detector loses close by, bodies only: a row with and one without the head.
+    """The keypoint that each detector loses without the head, bodies only: a row with and one without it.
 
     Parameters
     ----------
@@ -63,8 +62,8 @@ def lost_points(errors: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns `detector, case` (what is lost, and how), `subset, image_id, annotation_id, keypoint` (Halpe
-        index).
+        Columns `detector, case` (which keypoint is lost, and how), `subset, image_id, annotation_id,
+        keypoint` (Halpe index).
     """
     both = with_and_without_head(errors)
     is_lost = (both["kind"] == "good") & ~both["hit_headless"] & (both["kind_headless"] != "not found")

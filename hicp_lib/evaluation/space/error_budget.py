@@ -1,13 +1,13 @@
-"""What the 3D error of keypoints is made of: every source switched on alone, and off alone, over people.
+"""Contributions to the 3D error of keypoints: every source switched on alone, and off alone, over people.
 
-Simulated recordings know what is true. From there the sources of `error_sources` are switched on, any of
-them together. *Skin depth* is what the lifting makes of a depth image without errors at the true pixel: skin,
-cloth or what hides the joint; switched off, the vector from the joint to there is taken away. *Depth sensor*
-and *2D detection* replace that depth image, and that pixel, by the measured one. The error is the distance
-between where the robot has a keypoint, and where its reference is.
+Simulated recordings have exact ground truth. Starting from it, the sources of `error_sources` are switched on
+in any combination. *Skin depth* is the lifting with an error-free depth image at the true pixel, which gives
+skin, cloth or an occluding surface; when it is off, the vector from the joint to that point is subtracted.
+*Depth sensor* and *2D detection* replace that depth image, and that pixel, by the measured ones. The error is
+the distance between the robot's keypoint and its reference.
 
-All sets of sources are judged on the same keypoints: found with a score above a limit, in the image, and
-lifted whichever pixels and depths are taken.
+All sets of sources are compared on the same keypoints: those detected with a score above a threshold, in the
+image, and lifted with any of these pixels and depths.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,20 +33,20 @@ from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, PER_FRAME, Recording,
 ALL, AGAINST_MOCAP, IN_BASE = "everything", "against motion capture", "in the robot's frame"
 TOTALS = {
     ALL: {*s.SOURCES},
-    # A registration through the same camera, which stays where it is, takes in where the robot believes it.
+    # A registration through the same, static camera includes the error of the camera's assumed pose.
     AGAINST_MOCAP: {*s.SOURCES} - {s.OFFSETS, s.MOUNT},
     IN_BASE: {*s.SOURCES} - {s.MARKERS, s.REGISTRATION, s.CLOCK},
 }
-"""Sources that come together: all, those of the paper's comparison, and those the robot lives with."""
+"""Combinations of sources: all, those in the paper's comparison, and those that act on the robot."""
 _ALONE, _WITHOUT = "{}, alone", "without {}"
 STATES: dict[str, set[str]] = TOTALS | {_ALONE.format(source): {source} for source in s.SOURCES}
 STATES |= {_WITHOUT.format(source): {*s.SOURCES} - {source} for source in s.SOURCES}
-"""What is switched on, by the column that has the error then."""
+"""The sources switched on, by the column with the resulting error."""
 
 _FINGERS = tuple(NAMES[k] for hand in (LEFT_HAND, RIGHT_HAND) for k in hand[1:])
 _KEYPOINTS = (*JOINTS, *_FINGERS)
 _PARTS = [name.partition("_")[2] for name in JOINTS] + ["finger"] * len(_FINGERS)
-# The limb that a keypoint is seen on: upper arm of shoulders, else forearm.
+# The limb of a keypoint: upper arm for shoulders, else forearm.
 _SIDES = [name.partition("_")[0] for name in _KEYPOINTS]
 _ELBOWS = [_KEYPOINTS.index(f"{side}_elbow") for side in _SIDES]
 _OTHERS = ["shoulder" if part == "shoulder" else "wrist" for part in _PARTS]
@@ -54,7 +54,7 @@ _ENDS = [_KEYPOINTS.index(f"{side}_{joint}") for side, joint in zip(_SIDES, _OTH
 _CAMERA_POSITION = ["x_cam_m", "y_cam_m", "z_cam_m"]
 _TRUE, _FOUND = "true", "found"
 _NOTHING_M = 1e-9
-# What an error may depend on: the column, and the step that a factor is for.
+# Covariates of the error: the column, and the step to which a factor refers.
 _COVARIATES = {
     "10 cm further away": ("distance_m", 0.1),
     "limb at the camera, not across": ("towards_camera", 1.0),
@@ -78,22 +78,22 @@ def keypoint_errors(
     recording : Recording
         Simulated.
     found : sequence of Detections
-        Of each frame; the best person counts.
+        Of each frame; the best person is used.
     T_base_mocap : array or None, shape (4, 4)
         From clicks; None: the reference is the truth, not motion capture.
     amounts : s.Amounts
-        What is off, and how much.
+        Magnitudes of the errors.
     every : int, optional
-        The first frame counts, and every so many after it.
+        Use only the first and then every n-th frame.
     min_score : float, optional
-        Keypoints above it count.
+        Keypoints above it are used.
     seed : int or sequence of int, optional
-        Of the amounts' draws: the same for one person's recordings.
+        Of the random magnitudes: the same for all recordings of a person.
 
     Returns
     -------
     DataFrame
-        A row per method and keypoint that counts: columns `method, keypoint, part, frame`, `distance_m`
+        A row per method and used keypoint: columns `method, keypoint, part, frame`, `distance_m`
         (from the camera), `towards_camera` (0 where its limb, upper arm or forearm, is across the line of
         sight, 1 along it), `hidden` (by something in front), and the error in metres in a column for each of
         `STATES`.
@@ -145,7 +145,7 @@ def keypoint_errors(
 def _seen(
     recording: Recording, found: Mapping[str, Sequence[Detections]], every: int, min_score: float
 ) -> dict[tuple[str, str, bool], np.ndarray]:
-    """Places in the camera's frame (n, k, 3) by method, pixels, and whether the depth is the sensor's."""
+    """Positions in the camera's frame (n, k, 3) by method, pixels, and whether the depth is the sensor's."""
     some = replace(recording, **{name: getattr(recording, name)[::every] for name in PER_FRAME})
     exact_paths = [recording.folder / EXACT_DEPTH_DIR / path.name for path in some.depth_paths]
     people, seen_m = {pixels: of[::every] for pixels, of in found.items()}, {}
@@ -160,12 +160,12 @@ def _seen(
 
 
 def error_budget(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
-    """The error by each source alone, and what is gained by switching it off alone.
+    """The error by each source alone, and the gain from switching it off alone.
 
     Parameters
     ----------
     errors : DataFrame
-        As from `keypoint_errors`, of several people: columns `view, subject` besides.
+        As from `keypoint_errors`, of several people, with further columns `view, subject`.
     draws : Draws, optional
         Of people, in the bootstrap.
 
@@ -173,10 +173,10 @@ def error_budget(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
     -------
     DataFrame
         Columns `view, method, part, source, kind`, `value_m, low_m, high_m` (median over a person's
-        keypoints, mean over people, 95 % interval), `detectable_m` (the least such mean that so many people
-        would tell from 0), `n_people, n` (keypoints). Of the kind "total" are `TOTALS`, without motion
-        capture only the first; "alone" is the error by a source alone, "gain" what the error with everything
-        falls by without it. No rows of sources that move nothing.
+        keypoints, mean over people, 95 % interval), `detectable_m` (the smallest such mean that this number
+        of people could distinguish from 0), `n_people, n` (keypoints). Of the kind "total" are `TOTALS`,
+        without motion capture only the first; "alone" is the error by a source alone, "gain" the reduction of
+        the total error without it. Sources without an effect have no rows.
     """
     rows: list[tuple] = []
     for case, part in errors.groupby(["view", "method", "part"], sort=False):
@@ -197,14 +197,14 @@ def error_budget(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
 
 
 def covariates(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
-    """What the error in the robot's frame is multiplied by as distance, view or sight change.
+    """Factors on the error in the robot's frame with distance, viewing direction and occlusion.
 
-    Least squares of its logarithm on all of them at once, every person with the same weight.
+    Least squares of its logarithm on all covariates jointly, with equal weight for every person.
 
     Parameters
     ----------
     errors : DataFrame
-        The same; views are taken together.
+        As in `error_budget`; views are pooled.
     draws : Draws, optional
         Of people, in the bootstrap.
 

@@ -1,7 +1,7 @@
-"""What makes keypoints in space wrong, each source to be switched on: the camera, the robot, motion capture.
+"""Sources of error of keypoints in space, which can be switched on: camera, robot, motion capture.
 
-Amounts of what is calibrated are drawn once per person, as if each came to a robot of their own, and hold for
-all their frames.
+Calibration errors are drawn once per person, as if each had a robot of their own, and are constant over their
+frames.
 """
 
 from dataclasses import dataclass, replace
@@ -35,18 +35,18 @@ WITHOUT_FACE = np.setdiff1d(np.arange(N_KEYPOINTS), FACE)
 
 @dataclass(frozen=True)
 class Amounts:
-    """Standard deviations of what is off, one draw per person but for the jitter.
+    """Standard deviations of errors, drawn once per person except for the jitter.
 
     Attributes
     ----------
     joint_offset_rad : float
         Of every joint of torso and neck.
     mount_rad, mount_m : float
-        Of the camera on the head: turned about, and moved along, each axis.
+        Of the camera on the head: rotation about, and translation along, each axis.
     focal_share, centre_px : float
-        Of the focal length, as a share of it, and of either coordinate of the image's centre.
+        Of the focal length, relative to it, and of either coordinate of the principal point.
     clock_s, jitter_s : float
-        Of the offset between the clocks, and of each frame's stamp.
+        Of the offset between the clocks, and of each frame's timestamp.
     """
 
     joint_offset_rad: float
@@ -61,7 +61,7 @@ class Amounts:
 def true_detections(
     truth: pd.DataFrame, n_frames: int, keypoints: np.ndarray = WITHOUT_FACE
 ) -> list[Detections]:
-    """The true pixels as if detected, hidden ones too, one person per frame.
+    """The true pixels as detections, including occluded ones, one person per frame.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def true_detections(
     n_frames : int
         Number of images.
     keypoints : array of int, optional
-        Indices of those detected. Those of the face decide on no other's depth.
+        Indices of the detected ones. Those of the face do not influence the depth of others.
 
     Returns
     -------
@@ -85,12 +85,12 @@ def true_detections(
 
 
 def wrong_intrinsics(camera: Camera, amounts: Amounts, rng: np.random.Generator) -> Camera:
-    """The camera with another focal length and another centre of the image.
+    """The camera with another focal length and principal point.
 
     Parameters
     ----------
     camera : Camera
-        As it is.
+        The true one.
     amounts : Amounts
         What is off, and how much.
     rng : numpy.random.Generator
@@ -99,7 +99,7 @@ def wrong_intrinsics(camera: Camera, amounts: Amounts, rng: np.random.Generator)
     Returns
     -------
     Camera
-        What it is taken for.
+        The assumed one.
     """
     factor = 1 + rng.normal(0, amounts.focal_share)
     cx_px, cy_px = rng.normal((camera.cx_px, camera.cy_px), amounts.centre_px)
@@ -110,7 +110,7 @@ def wrong_intrinsics(camera: Camera, amounts: Amounts, rng: np.random.Generator)
 def wrong_poses(
     recording: rec.Recording, amounts: Amounts, rng: np.random.Generator
 ) -> dict[tuple[bool, bool], np.ndarray]:
-    """Camera poses in the base frame as wrong joint readings and a wrong mount give them.
+    """Camera poses in the base frame with errors of joint angles and of the camera mount.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def wrong_poses(
     Returns
     -------
     dict of (bool, bool) to array, shape (n_frames, 4, 4)
-        T_base_cam, by whether the joints are off and whether the mount is.
+        T_base_cam, by whether joints and mount have errors.
 
     Raises
     ------
@@ -161,14 +161,14 @@ def reference_shifts(
     amounts: Amounts,
     rng: np.random.Generator,
 ) -> dict[str, np.ndarray]:
-    """By how much motion capture has keypoints beside where they are.
+    """Displacements of the motion capture's reference from the true keypoints.
 
     Parameters
     ----------
     recording : rec.Recording
         Simulated, with motion capture.
     true_m : array, shape (n_frames, n_keypoints, 3)
-        Where they are (base frame), `JOINTS` first.
+        True positions (base frame), `JOINTS` first.
     T_base_mocap : array, shape (4, 4)
         The registration's.
     amounts : Amounts
@@ -179,8 +179,8 @@ def reference_shifts(
     Returns
     -------
     dict of str to array, shape (n_frames, n_keypoints, 3)
-        By source: the middle of two markers beside the joint (0 where there are none; NaN where one was not
-        measured), the registration, and where the keypoint is an instant later.
+        By source: the mean of the two markers relative to the joint (0 where there are none; NaN where one
+        was not measured), the registration, and the keypoint's motion during the clock error.
     """
     simulation = rec.read_simulation(recording) or {}
     mocap = read_mocap(recording.mocap_path or recording.folder / rec.MOCAP_FILE)

@@ -1,19 +1,19 @@
-"""Temporal stability: keypoints that come and go, and jump, from one frame of a recording to the next.
+"""Temporal stability: keypoints that appear, disappear and jump between frames of a recording.
 
 - A keypoint is *given* in a frame when its score is at least a threshold.
-- The *flicker rate* is the share of keypoints that are given in one of two consecutive frames only, of those
-  given in either.
-- The *jitter* is the length of the second difference of a keypoint's places in three consecutive frames,
-  over the square root of 6: what an error of the single frame that is independent of the others' is long,
-  on average. Steady motion adds nothing.
+- The *flicker rate* is the share of keypoints given in only one of two consecutive frames, of those given in
+  either.
+- The *jitter* is the length of the second difference of a keypoint's positions in three consecutive frames,
+  divided by the square root of 6: the average length of the error of a single frame, if errors are
+  independent. Uniform motion does not contribute.
 
-The causal filter looks back only: a keypoint is taken as given when it was in most of the last
-`MAJORITY_OF` frames, and its place runs through a One Euro filter (Casiez, Roussel and Vogel, CHI 2012; the
-authors' package), which smooths less the faster a keypoint moves. Its latency is the time by which filtered
-places lag behind unfiltered ones: the least-squares factor between that lag and the velocity.
+The causal filter uses past frames only: a keypoint counts as given when it was given in most of the last
+`MAJORITY_OF` frames, and its position is smoothed by a One Euro filter (Casiez, Roussel and Vogel, CHI 2012;
+the authors' package), which smooths less when a keypoint moves faster. Its latency is the time by which
+filtered positions lag behind unfiltered ones: the least-squares factor between that lag and the velocity.
 
-Consecutive frames show nearly the same view when the recording's rate is high against the motion. Detectors
-that find hands and faces are judged on the 17 body keypoints all detectors share.
+Consecutive frames show nearly the same view if the frame rate is high compared with the motion. Detectors of
+hands and faces are also evaluated on the 17 body keypoints that all detectors share.
 """
 
 from collections.abc import Mapping, Sequence
@@ -52,14 +52,14 @@ def best_person(found: Sequence[Detections], min_score: float = MIN_SCORE) -> np
 
 
 def causal_filter(tracks_px: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-    """Tracks filtered as the module says, by what was seen up to each frame.
+    """Causally filtered tracks, as described in this module.
 
     Parameters
     ----------
     tracks_px : array, shape (n, k, 2)
         NaN where not given.
     times_s : array, shape (n,)
-        Rising.
+        Increasing.
 
     Returns
     -------
@@ -86,14 +86,14 @@ def _filtered_keypoint(track_px: np.ndarray, times_s: np.ndarray) -> np.ndarray:
 
 
 def latency_s(tracks_px: np.ndarray, filtered_px: np.ndarray, times_s: np.ndarray) -> float:
-    """By how much filtered tracks lag behind the unfiltered ones.
+    """The lag of filtered tracks behind the unfiltered ones.
 
     Parameters
     ----------
     tracks_px, filtered_px : array, shape (n, k, 2)
         NaN where not given.
     times_s : array, shape (n,)
-        Rising.
+        Increasing.
 
     Returns
     -------
@@ -127,18 +127,18 @@ def flicker(
     found : mapping of str to sequence of Detections
         Of each frame, by detector.
     times_s : array, shape (n,)
-        Rising.
+        Increasing.
     draws : Draws, optional
         Of the bootstrap.
     min_score : float, optional
-        From which a keypoint is given.
+        Minimum score of a given keypoint.
 
     Returns
     -------
     DataFrame
         Columns `detector, tracks` ("as detected", "filtered"), `measure` ("flicker rate", "jitter [px]",
-        "latency [s]"), `value, low, high, n`: 95 % intervals from drawing stretches of a second; none for the
-        latency.
+        "latency [s]"), `value, low, high, n`: 95 % intervals from resampling stretches of a second; none for
+        the latency.
     """
     rows = []
     for detector, run in found.items():
@@ -154,7 +154,7 @@ def flicker(
 
 
 def _measures(tracks_px: np.ndarray, times_s: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Values and their times: whether keypoints flicker, and how far they jump."""
+    """Values and their times: whether keypoints flicker, and the jitter."""
     given = np.isfinite(tracks_px).all(axis=-1)
     close = (np.diff(times_s) <= MAX_GAP_S)[:, None]
     either = (given[1:] | given[:-1]) & close

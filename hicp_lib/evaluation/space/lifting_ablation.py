@@ -1,8 +1,8 @@
-"""What each step of lifting beyond the paper brings: 3D error against known positions, step by step.
+"""Effect of each step of the robust lifting: 3D error against known positions, step by step.
 
-All steps are compared on the same keypoints of the same detections: those the paper's method lifts. Steps
-may lift more of them, which is counted beside the errors and not in them. The person with the best score of
-an image counts.
+All steps are compared on the same keypoints of the same detections: those that the paper's method lifts.
+Steps may lift more keypoints; these are counted, but not included in the errors. The person with the highest
+score of an image is used.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
 
 N_STEPS = {"paper": 0, "+ below the surface": 1, "+ near surfaces": 2, "+ limb lengths": 3}
 N_STEPS |= {"robust": len(STEPS)}
-"""The paper's method, then one step more each up to the whole, for `hicp_lib.lifting.table.lift_found`."""
+"""The paper's method, then one more step each up to all, for `hicp_lib.lifting.table.lift_found`."""
 
 MIN_SCORE = 0.3
 _KEY = ["frame", "keypoint"]
@@ -34,20 +34,20 @@ def lifting_errors(
     Parameters
     ----------
     points : DataFrame
-        One detector's keypoints as `lift_found` gives them with `N_STEPS`.
+        One detector's keypoints as from `lift_found` with `N_STEPS`.
     truth : DataFrame
-        As `recording.read_truth` gives it.
+        As from `recording.read_truth`.
     T_base_cam : array, shape (n, 4, 4)
         Of the frames.
     min_score : float, optional
-        Detected keypoints count from this score.
+        Minimum score of detected keypoints.
 
     Returns
     -------
     DataFrame
         One row per keypoint detected with `min_score` or more, columns `frame, keypoint, group`, one per
-        method in metres, NaN where it does not lift, and of the whole method `off_m` (how far its depth is
-        off), `sigma_m` and `reason`; those of several recordings may be put together.
+        method in metres, NaN where it does not lift, and for the full method `off_m` (error of its depth),
+        `sigma_m` and `reason`; tables of several recordings may be concatenated.
     """
     group_of = {name: group for group, names in GROUPS.items() for name in names}
     counts = (points["person"] == 0) & (points["score"] >= min_score) & points["keypoint"].isin(group_of)
@@ -63,7 +63,7 @@ def lifting_errors(
 
 
 def sigma_coverage(errors: pd.DataFrame) -> pd.DataFrame:
-    """How often a depth lies within one and two of its standard deviations from the truth (normal: .68, .95).
+    """How often a depth is within one and two of its standard deviations of the truth (normal: .68, .95).
 
     Parameters
     ----------

@@ -1,12 +1,12 @@
 """Errors of lifted keypoints against motion capture (paper section IV-C, Tables III and IV).
 
 The reference of a joint is the mean of its two markers, as in the paper. Simulated recordings also know
-the joint's centre, which no marker can sit on; errors against it are reported beside.
+the joint's centre, which no marker can sit on; errors against it are reported, too.
 
-Throughout, `errors` is the table of `mocap_errors`: one row per detector, method, joint and *frame*, also
-where nothing was found, so that what is missing counts; those of several people as one, with a column
-`subject`, by `hicp_lib.evaluation.cases.over_people`. Intervals are 95 % ones of a bootstrap that draws
-people, and of each blocks of frames; of one person, blocks only.
+Throughout, `errors` is the table of `mocap_errors`: one row per detector, method, joint and *frame*,
+including frames without the joint, so that missing ones count; tables of several people are joined by
+`hicp_lib.evaluation.cases.over_people`, with a column `subject`. Intervals are 95 % ones of a bootstrap that
+resamples people, and blocks of frames of each; with one person, blocks only.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,7 @@ from hicp_lib.evaluation.statistics.resampling import Draws, weighted_median, wi
 from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.qualisys import MotionCapture
 
-# Elbows and wrists are in the paper's tables; shoulders are reported apart.
+# Elbows and wrists are in the paper's tables; shoulders are reported separately.
 TABLE_JOINTS = ("left_elbow", "right_elbow", "left_wrist", "right_wrist")
 JOINTS = (*TABLE_JOINTS, "left_shoulder", "right_shoulder")
 MARKERS: dict[str, tuple[str, str]] = {
@@ -36,7 +36,7 @@ _CASE = ["detector", "method", "keypoint"]
 def marker_means(
     mocap: MotionCapture, stamps_s: np.ndarray, T_base_mocap: np.ndarray, joints: Sequence[str] = JOINTS
 ) -> pd.DataFrame:
-    """Where motion capture has the joints at the camera's stamps: the mean of each joint's two markers.
+    """Reference positions of joints at the camera's times: the mean of each joint's two markers.
 
     Parameters
     ----------
@@ -82,19 +82,19 @@ def mocap_errors(
     Parameters
     ----------
     points : DataFrame
-        `lift_recording`'s table with columns `detector, method` before its own; the person with the best
-        score of a frame counts.
+        `lift_recording`'s table with columns `detector, method` before its own; the person with the highest
+        score of a frame is used.
     reference : DataFrame
         As from `marker_means`.
     truth : DataFrame, optional
-        As from `read_truth`; None where it is not known.
+        As from `read_truth`; None if unknown.
 
     Returns
     -------
     DataFrame
         A row per detector, method and row of `reference`: columns `detector, method, frame, keypoint, x_m,
         y_m, z_m, score` (0 where not detected), `reference_x_m, reference_y_m, reference_z_m, error_m` (NaN
-        where not lifted or the reference is missing), `centre_error_m` (NaN without truth).
+        if not lifted or without a reference), `centre_error_m` (NaN without truth).
     """
     keys = ["frame", "keypoint"]
     centres = pd.DataFrame(columns=[*keys, *POSITION]) if truth is None else truth[[*keys, *POSITION]]
@@ -112,7 +112,7 @@ def mocap_errors(
 def median_errors(
     errors: pd.DataFrame, min_scores: Sequence[float] = MIN_SCORES, draws: Draws = Draws()
 ) -> pd.DataFrame:
-    """Count and median distance of the keypoints above a score: Tables III and IV.
+    """Count and median distance of keypoints above a score: Tables III and IV.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def median_differences(
     min_scores: Sequence[float] = MIN_SCORES,
     draws: Draws = Draws(),
 ) -> pd.DataFrame:
-    """Medians of cases that differ in one label only, one less the other's on the same draws of frames.
+    """Differences of medians between cases that differ in one label only, on the same resamples.
 
     Parameters
     ----------
@@ -167,9 +167,9 @@ def median_differences(
     Returns
     -------
     DataFrame
-        Columns `detector, method, keypoint, min_score, other` (the label of the one that is taken away),
+        Columns `detector, method, keypoint, min_score, other` (the label of the subtracted case),
         `value_m, low_m, high_m, n_people` (with a median by both), `detectable_m` (`smallest_difference` of
-        people's own medians); both directions are there.
+        people's own medians); both directions are included.
     """
     labels = [*_CASE, "min_score"]
     k, rows, drawn, of_people = labels.index(between), [], {}, {}
@@ -193,14 +193,14 @@ def distance_shares(
     beyond: bool = False,
     draws: Draws = Draws(),
 ) -> pd.DataFrame:
-    """Share of the frames with motion capture in which a joint was found within a distance of it.
+    """Share of the frames with motion capture in which a joint was found within a distance of its reference.
 
     Parameters
     ----------
     errors : DataFrame
         `mocap_errors`.
     min_scores : sequence of float, optional
-        Keypoints above each count as found.
+        Thresholds above which keypoints count as found.
     thresholds_m : sequence of float, optional
         The distances.
     beyond : bool, optional
@@ -229,7 +229,7 @@ def distance_shares(
 def _cases(
     errors: pd.DataFrame, min_scores: Sequence[float], draws: Draws
 ) -> Iterator[tuple[tuple, pd.DataFrame, np.ndarray, np.ndarray]]:
-    """Labels, rows, errors of what was found (n_frames,) and weights of frames, the same for all cases."""
+    """Labels, rows, errors of found joints (n_frames,) and weights of frames, the same for all cases."""
     whose, length = _subjects(errors.drop_duplicates("frame").sort_values("frame")), _block_length(errors)
     weights = boot.draw_counts(whose, draws, length)
     for case, part in errors.groupby(_CASE, sort=False):
@@ -246,7 +246,7 @@ def _shares(weights: np.ndarray, hits: np.ndarray, of: np.ndarray) -> np.ndarray
 
 
 def _subjects(errors: pd.DataFrame) -> np.ndarray:
-    """Whose each row is; all of one person where it is not said."""
+    """The subject of each row; one person for all rows without such a column."""
     return errors.get("subject", pd.Series(0, errors.index)).to_numpy()
 
 

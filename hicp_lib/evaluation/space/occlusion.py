@@ -1,4 +1,4 @@
-"""How the camera stands to a joint: how far it is, and whether something is in front of it.
+"""Distance of a joint from the camera, and whether it is occluded.
 
 Both come from motion capture and the depth image, so any recording has them.
 """
@@ -11,28 +11,28 @@ from hicp_lib.core.camera import project, transform
 from hicp_lib.evaluation.space.stability import POSITION
 from hicp_lib.recordings.recording import Recording, read_depth_m
 
-# How far in front of the middle between two markers something must be to hide the joint: more than half
-# the limb and its sleeve.
+# Minimum distance of an occluding surface in front of the mean of two markers: more than half the limb and
+# its sleeve.
 IN_FRONT_M = {"wrist": 0.06, "elbow": 0.09, "shoulder": 0.13}
 _HALF_WINDOW_PX = 2
 
 
 def joint_occlusion(recording: Recording, positions: pd.DataFrame) -> pd.DataFrame:
-    """Distance from the camera, and what the depth image has at each joint's pixel.
+    """Distance from the camera, and occlusion by the depth image at each joint's pixel.
 
     Parameters
     ----------
     recording : Recording
         With depth.
     positions : DataFrame
-        Columns `frame, keypoint` ("left_wrist", ...), `x_m, y_m, z_m` (base frame); NaN where not known.
+        Columns `frame, keypoint` ("left_wrist", ...), `x_m, y_m, z_m` (base frame); NaN if unknown.
 
     Returns
     -------
     DataFrame
         A row for each of `positions`: columns `frame, keypoint, distance_m` (from the optical centre) and
         `sight`: "clear", "hidden" (the median depth of 5 x 5 pixels is more than `IN_FRONT_M` nearer),
-        "outside" the image, "no depth" there, or "unknown" where the position is.
+        "outside" the image, "no depth" there, or "unknown" if the position is.
     """
     frames = positions["frame"].to_numpy()
     T_cam_base = np.linalg.inv(recording.T_base_cam)[frames]

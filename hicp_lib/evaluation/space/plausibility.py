@@ -1,16 +1,15 @@
-"""Bodies that no human has: hips in the abdomen, broken fingers, tilted shoulders.
+"""Anatomically implausible detections: hips in the abdomen, broken fingers, tilted shoulders.
 
-What is held against the keypoints is anatomy, so recordings without truth can be judged, too; where the truth
-is known, the same measure on it says how often a perfect answer would be called wrong.
+Keypoints are compared with anatomy, so recordings without ground truth can be evaluated, too; with ground
+truth, the same measure on it gives the rate of false alarms.
 
 - A hip is *in the abdomen* when it lies more than 5 cm nearer to the shoulder of its side than the shortest
-  adults' trunk is long: .288 of the stature (Winter 2009) of a woman of 1.52 m, whom one in twenty
-  is shorter than.
+  adults' trunk is long: .288 of the stature (Winter 2009) of a woman of 1.52 m, the 5th percentile.
 - A finger is *broken* when its middle and its end joint bend to opposite sides, each by more than 20 degrees
-  as the image shows it. They bend in one plane and to one side only (Chen Chen et al. 2013), so from wherever
-  it is seen, a finger turns one way all along. Hence the image alone tells. Angles in space would not: noise
-  in depth breaks the fingers of true pixels.
-- The *shoulder line* of somebody who sits upright is level: its angle to the horizontal is its tilt.
+  as the image shows it. Fingers bend in one plane and to one side only (Chen Chen et al. 2013), so in any
+  view a finger bends in the same direction at all joints, and the image alone is sufficient. Angles in space
+  would not work: with noise in depth, even true pixels give broken fingers.
+- The *shoulder line* of a person who sits upright is horizontal: its angle to the horizontal is its tilt.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,12 +25,12 @@ from hicp_lib.evaluation.statistics.resampling import Draws
 SHORTEST_TRUNK_M = 0.288 * 1.52
 IN_ABDOMEN_M = SHORTEST_TRUNK_M - 0.05
 BACKWARDS_RAD = float(np.radians(20))
-# Of a hand's keypoints, from knuckle to tip; the thumb bends otherwise.
+# Of a hand's keypoints, from knuckle to tip; the thumb bends differently.
 _FINGERS = np.arange(5, 21).reshape(4, 4)
 
 
 def implausible(lifted: LiftedViews, draws: Draws = Draws()) -> pd.DataFrame:
-    """The measures of this module, of every detector in every view.
+    """The measures of this module for every detector in every view.
 
     Parameters
     ----------
@@ -43,9 +42,9 @@ def implausible(lifted: LiftedViews, draws: Draws = Draws()) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns `view, detector, method, part, measure`; `value` with `low, high` (95 %), the share of the
-        `n_images` of `n_people` in which the part is found, of the shoulder line the mean angle in radians;
-        `of_truth`, the same of the true keypoints (NaN where they are not known).
+        Columns `view, detector, method, part, measure`; `value` with `low, high` (95 %), as a share of the
+        `n_images` of `n_people` in which the part is found, or for the shoulder line the mean angle in
+        radians; `of_truth`, the same for the true keypoints (NaN if unknown).
     """
     rows = []
     for measure, (values_of, parts, columns) in _MEASURES.items():
@@ -70,7 +69,7 @@ def backwards(hands_px: np.ndarray) -> np.ndarray:
     Returns
     -------
     array, shape (n,)
-        1 or 0; NaN where no finger is found whole.
+        1 or 0; NaN if no finger is found completely.
     """
     fingers = hands_px[:, _FINGERS] @ [1, 1j]  # (n, finger, 4), as complex numbers
     bones = np.diff(fingers, axis=2)
@@ -81,7 +80,7 @@ def backwards(hands_px: np.ndarray) -> np.ndarray:
 
 
 def _short(trunk_m: np.ndarray) -> np.ndarray:
-    """Whether a shoulder and its hip, (n, 2, 3), are nearer than in the shortest adult."""
+    """Whether a shoulder and its hip, (n, 2, 3), are closer than in the shortest adult."""
     length_m = np.linalg.norm(np.diff(trunk_m, axis=1)[:, 0], axis=1)
     return np.where(np.isfinite(length_m), length_m < IN_ABDOMEN_M, np.nan)
 

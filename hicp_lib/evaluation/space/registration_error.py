@@ -1,4 +1,4 @@
-"""What a registration adds to the errors, where the exact transform is known."""
+"""Contribution of the registration to the errors, where the exact transform is known."""
 
 from collections.abc import Iterable, Sequence
 
@@ -22,23 +22,23 @@ _COLUMNS = ["method", "n_points", "rms_m", "leave_one_out_m", "turned_rad", "add
 def compare_registrations(
     registrations: Sequence[Registration], mocap: MotionCapture, T_base_mocap: np.ndarray | None
 ) -> pd.DataFrame:
-    """Registrations side by side, with how far from the truth they put the markers on the person.
+    """Compare registrations, including their errors at the markers on the person.
 
     Parameters
     ----------
     registrations : sequence of Registration
-        What is compared.
+        The registrations to compare.
     mocap : MotionCapture
         Its markers.
     T_base_mocap : array or None, shape (4, 4)
-        The exact transform; None where it is not known.
+        The exact transform; None if unknown.
 
     Returns
     -------
     DataFrame
         Columns `method, n_points, rms_m, leave_one_out_m`, and against the exact transform `turned_rad`
         (angle between the rotations), `added_m` and `worst_m` (median and largest displacement of the markers
-        on the person, all frames); NaN where it is not known.
+        on the person, all frames); NaN if unknown.
     """
     on_person = [k for k, name in enumerate(mocap.names) if name != CAMERA_MARKER]
     markers_m = mocap.points_m[:, on_person].reshape(-1, 3)
@@ -62,7 +62,7 @@ def marker_pixels(
     frames: Iterable[int],
     offset_s: float = 0.0,
 ) -> pd.DataFrame:
-    """Where each registration puts the measured markers in images.
+    """Projections of the measured markers into images by each registration.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def marker_pixels(
     registrations : sequence of Registration
         What is compared.
     frames : iterable of int
-        Of the images; a number may come more than once.
+        Of the images; a number may occur more than once.
     offset_s : float, optional
         To add to the motion capture's stamps to have them on the camera's clock.
 

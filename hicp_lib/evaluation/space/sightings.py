@@ -1,12 +1,12 @@
-"""In which images parts of people are found, how near, and how far off: what detectors are compared by.
+"""In which images parts of people are found, and how close to their positions, to compare detectors.
 
-Parts are more than in `hicp_lib.evaluation.space.stability`: an arm is found with any of its joints.
+There are more parts than in `hicp_lib.evaluation.space.stability`: an arm is found with any of its joints.
 Rows are per image, for `hicp_lib.evaluation.statistics.proportions`: shares with intervals, and differences
 of detectors or of parts on the same images.
 
-Nearly equal views of still people differ in nothing but the camera's pose, and in that by little, so an
-answer that follows what is seen stays: `similar_views` is `hicp_lib.evaluation.space.flicker` for views that
-are no sequence. In its bootstrap people are drawn, and views of each, and with them the pairs they make.
+Nearly equal views of still people differ only in the camera's pose, and only a little, so a reliable detector
+should give the same result: `similar_views` is `hicp_lib.evaluation.space.flicker` for views that are not a
+sequence. Its bootstrap resamples people, and views of each, with the pairs they form.
 """
 
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ ALL_PARTS: Parts = {**PARTS, **_ARMS, **_ANY}
 
 
 def sightings(lifted: LiftedViews) -> pd.DataFrame:
-    """Of every part in every image, whether it is found and what share of its keypoints is near.
+    """For every part in every image, whether it is found, and which share of its keypoints is near.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def sightings(lifted: LiftedViews) -> pd.DataFrame:
 
 
 NEAR_M, NEAR_RAD = 0.05, float(np.radians(5))
-"""Views are nearly equal whose cameras are no further apart, in place and in direction."""
+"""Maximum difference of nearly equal views' cameras, in position and direction."""
 
 
 def similar_pairs(T_base_cam: np.ndarray) -> np.ndarray:
@@ -81,19 +81,19 @@ def similar_pairs(T_base_cam: np.ndarray) -> np.ndarray:
     """
     places_m, turns = T_base_cam[:, :3, 3], T_base_cam[:, :3, :3]
     apart_m = np.linalg.norm(places_m[:, None] - places_m, axis=-1)
-    cosine = (np.einsum("iab,jab->ij", turns, turns) - 1) / 2  # of the angle of the turn between the two
+    cosine = (np.einsum("iab,jab->ij", turns, turns) - 1) / 2  # of the rotation angle between the two
     return np.argwhere(np.triu((apart_m <= NEAR_M) & (cosine >= np.cos(NEAR_RAD)), 1))
 
 
 def similar_views(
     lifted: LiftedViews, T_base_cam: Mapping[str, np.ndarray], draws: Draws = Draws()
 ) -> pd.DataFrame:
-    """How often a part comes or goes between nearly equal views, and how far it moves in the base frame.
+    """How often a part appears or disappears between nearly equal views, and how far it moves.
 
     Parameters
     ----------
     lifted : LiftedViews
-        Views of one subject make pairs.
+        Pairs are formed within a subject.
     T_base_cam : mapping of str to array, shape (n, 4, 4)
         Camera poses, by view.
     draws : Draws, optional
@@ -105,7 +105,8 @@ def similar_views(
         Columns `view, detector, method, part, measure, value, low, high, n` (pairs that count), `n_people`
         (with one that does; no interval from fewer than `MIN_DRAWN` of several). "flicker rate": of the pairs
         in which any keypoint of the part is found in either view, the share in which none is in the other.
-        "moves [m]": median over pairs of how far a keypoint moves; of several, their median.
+        "moves [m]": median over pairs of the distance that a keypoint moves; for several keypoints, their
+        median.
     """
     rows: list[tuple] = []
     pairs = {view: similar_pairs(poses).T for view, poses in T_base_cam.items()}
@@ -127,10 +128,10 @@ def similar_views(
 
 
 def _drawn_together(times: np.ndarray, subjects: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """How often each pair of one subject's images is drawn, (draws, n_pairs), from how often each image is.
+    """How often each pair of one subject's images is drawn, (draws, n_pairs), from the counts of images.
 
-    A subject that is drawn twice makes pairs within each time, not between them: on average half of those
-    that its images make.
+    A subject that is drawn twice forms pairs within each copy, not between them: on average half of all pairs
+    of its images.
     """
     drawn = np.ones(times.shape)
     for of in of_each(subjects):
@@ -138,7 +139,7 @@ def _drawn_together(times: np.ndarray, subjects: np.ndarray, a: np.ndarray, b: n
     return times[:, a] * times[:, b] / drawn[:, a]
 
 
-_LEAST_IMAGES = 3  # of a person: of one, the distance to their median is 0
+_LEAST_IMAGES = 3  # of a person: with one, the distance to the median is 0
 
 
 def spread_and_bias(lifted: LiftedViews, draws: Draws = Draws()) -> pd.DataFrame:
@@ -153,14 +154,14 @@ def spread_and_bias(lifted: LiftedViews, draws: Draws = Draws()) -> pd.DataFrame
     Returns
     -------
     DataFrame
-        Columns `view, detector, method, part, n_images` (in which it was found), `n_people` (of spread and
-        bias; no intervals from fewer than `MIN_DRAWN` of several), then in metres,
-        each with `_low` and `_high` beside it: `spread_m`, the median distance to the subject's median
-        position; with `truth` also `bias_m`, how far a subject's median position is from the true one, mean
-        over subjects, and `error_m`, the median distance to the truth. For a hand, the mean of each over its
-        keypoints; NaN where nothing was found. Spread and bias are of those subjects in at least three of
-        whose images the keypoint was found; of n images the spread comes out a share of about 1 / n too
-        small, as the median lies between them.
+        Columns `view, detector, method, part, n_images` (in which it was found), `n_people` (for spread and
+        bias; no intervals from fewer than `MIN_DRAWN` of several), then in metres, each with `_low` and
+        `_high`: `spread_m`, the median distance to the subject's median position; with `truth` also `bias_m`,
+        the distance of a subject's median position from the true one, mean over subjects, and `error_m`, the
+        median distance to the truth. For a hand, the mean of each over its keypoints; NaN where nothing was
+        found. Spread and bias use subjects with the keypoint found in at least three images. With n images
+        the spread is underestimated by a fraction of about 1 / n, since the median is computed from the same
+        images.
     """
     rows = []
     for case, part, whose, found_m, true_m in lifted.cases():
@@ -177,7 +178,7 @@ def spread_and_bias(lifted: LiftedViews, draws: Draws = Draws()) -> pd.DataFrame
 
 
 def _n_people(found_m: np.ndarray, subjects: np.ndarray) -> int:
-    """In how many a keypoint of the part is found in `_LEAST_IMAGES`."""
+    """Number of subjects with a keypoint of the part in at least `_LEAST_IMAGES` images."""
     counts = [np.isfinite(found_m[of, :, 0]).sum(axis=0).max() for of in of_each(subjects)]
     return int(np.sum(np.array(counts) >= _LEAST_IMAGES))
 
@@ -187,7 +188,7 @@ def _distances_drawn(
 ) -> dict[str, np.ndarray]:
     """Spread, bias and error in every draw, shape (draws,), mean over the keypoints found.
 
-    Medians are taken anew in every draw.
+    Medians are recomputed in every draw.
     """
     draws: dict[str, list[np.ndarray]] = {"spread_m": [], "bias_m": [], "error_m": []}
     for k, found in enumerate(found_m.swapaxes(0, 1)):
@@ -199,7 +200,7 @@ def _distances_drawn(
             medians = [weighted_median(found[of, i], weights[:, of]) for i in range(3)]
             median_m = np.stack(medians, axis=1)
             off_m[:, of] = np.linalg.norm(found[of] - median_m[:, None], axis=-1)
-            if true_m is not None:  # the same in all images of somebody who keeps still
+            if true_m is not None:  # equal in all images of a still person
                 bias_m[:] = np.linalg.norm(median_m - true_m[of, k].mean(axis=0), axis=1)
         draws["spread_m"].append(weighted_median(off_m, weights))
         if true_m is not None:

@@ -1,15 +1,15 @@
-"""How steadily, and how truly, 3D keypoints of still people are found from many views (paper section IV-B).
+"""Stability and accuracy of 3D keypoints of still people in many views (paper section IV-B).
 
-A person sits still and the robot looks from many poses, so every view should give the same position in
-the robot's base frame. *Stability* is how close views come to the detector's own median position of that
-person; it needs no truth, and a detector that is always wrong in the same way is stable. *Accuracy* is the
-same against the true position, which simulated recordings have.
+A person sits still while the robot looks from many poses, so every view should give the same position in the
+robot's base frame. *Stability* is how close views are to the detector's own median position of that person;
+it needs no ground truth, and a detector that is always wrong in the same way is stable. *Accuracy* is the
+same relative to the true position, which simulated recordings have.
 
 Throughout, `points` is the table of `hicp_lib.lifting.table.lift_recording` with the columns `view`,
-`subject`, `detector` and `method` before its own, frames of a view numbered on from subject to subject, and
-`subjects` maps every view to whose each of its images is. The person with the best score of each image
-counts; a keypoint counts as found when its score is above `min_score` and it could be lifted. Intervals are
-95 % percentile ones from drawing subjects, and images of each.
+`subject`, `detector` and `method` before its own, frame numbers of a view continue from subject to subject,
+and `subjects` maps every view to the subject of each of its images. The person with the highest score of each
+image is used; a keypoint counts as found when its score is above `min_score` and it could be lifted.
+Intervals are 95 % percentile ones from resampling subjects, and images of each.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,7 +31,7 @@ MIN_SCORE = 0.1
 
 Parts = Mapping[str, Sequence[str]]
 
-# What the paper reports. All 21 keypoints of a hand count, each against its own median position.
+# The parts in the paper. All 21 keypoints of a hand are used, each relative to its own median position.
 PARTS: Parts = {
     f"{side} {part}": keypoints
     for part in ("shoulder", "elbow", "wrist", "hand")
@@ -43,16 +43,16 @@ PARTS: Parts = {
 def counted(
     points: pd.DataFrame, min_score: float = MIN_SCORE, columns: Sequence[str] = POSITION
 ) -> pd.DataFrame:
-    """The rows that count: the best person of an image, score above `min_score`, with a place in `columns`.
+    """The used rows: the best person of an image, scores above `min_score`, with a position in `columns`.
 
     Parameters
     ----------
     points : DataFrame
-        What was lifted, as the module says.
+        Lifted keypoints, as described in this module.
     min_score : float, optional
         Keypoints above it count.
     columns : sequence of str, optional
-        The coordinates that must be there.
+        The coordinates that must be present.
 
     Returns
     -------
@@ -70,16 +70,16 @@ def counted(
 
 @dataclass(frozen=True)
 class LiftedViews:
-    """What was lifted of people in views.
+    """Lifted keypoints of people in views.
 
     Attributes
     ----------
     points : DataFrame
-        As the module says.
+        As described in this module.
     subjects : mapping of str to array, shape (n_frames,)
-        Whose each image is, by view.
+        The subject of each image, by view.
     truth : mapping of str to DataFrame or None
-        By view, a table with `frame, keypoint` and true coordinates; None where they are not known.
+        By view, a table with `frame, keypoint` and true coordinates; None if unknown.
     min_score : float
         Keypoints above it count.
     """
@@ -90,10 +90,10 @@ class LiftedViews:
     min_score: float = MIN_SCORE
 
     def cases(self, parts: Parts = PARTS, columns: Sequence[str] = POSITION) -> Iterator[tuple]:
-        """Every part that a detector gives, in every view.
+        """Every part of every detector in every view.
 
-        A detector of the registry gives the groups of keypoints named there, any other those it finds one of
-        in some view. A group that is given and not found counts.
+        A detector in the registry gives the groups of keypoints named there, any other those that it finds in
+        some view. A group that is given but not found is included.
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class LiftedViews:
         part : str
         subjects : array, shape (n_frames,)
         found, true : array, shape (n_frames, n_keypoints, d)
-            Places; the true ones None without `truth`.
+            Positions; the true ones None without `truth`.
         """
         by_detector, names = self.points.groupby("detector"), list(dict.fromkeys(chain(*parts.values())))
         given = {name: _gives(name, set(rows["keypoint"].unique())) for name, rows in by_detector}
@@ -119,7 +119,7 @@ class LiftedViews:
             n = len(whose)
             true = None if self.truth is None else position_array(self.truth[view], names, n, columns)
             for run in runs.itertuples(index=False, name=None):
-                # A detector that finds nobody in a view has no rows there, and is counted all the same.
+                # A detector that finds nobody in a view has no rows there, but must be included.
                 places = position_array(found.get((view, *run), self.points[:0]), names, n, columns)
                 for part, keypoints in parts.items():
                     if given[run[0]] & set(keypoints):
@@ -144,10 +144,10 @@ def median_positions(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.D
 def within_distance(
     lifted: LiftedViews, thresholds_m: Sequence[float] = THRESHOLDS_M, draws: Draws = Draws()
 ) -> pd.DataFrame:
-    """Fraction of images in which a keypoint was found within a distance of where it should be.
+    """Fraction of images in which a keypoint was found within a distance of its reference position.
 
-    An image in which it was not found counts as not within. For a hand, each of its keypoints counts alike.
-    A detector that does not give a part has no row; one that gives it has, though it may never find it.
+    An image in which it was not found counts as not within. The keypoints of a hand have equal weight. A
+    detector that does not give a part has no row; one that gives it has a row, even if it never finds it.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def position_array(
 
 
 def _gives(detector: str, found: set[str]) -> set[str]:
-    """The keypoints of the groups that a detector gives, or found one of if the registry does not know it."""
+    """The keypoints of the groups that a detector gives, or finds if it is not in the registry."""
     names = {group: {NAMES[i] for i in keypoints} for group, keypoints in GROUPS.items()}
     groups = groups_of({}, detector) or [group for group in names if names[group] & found]
     return set().union(*(names[group] for group in groups))
@@ -216,7 +216,7 @@ def _gives(detector: str, found: set[str]) -> set[str]:
 def own_medians(found_m: np.ndarray, subjects: np.ndarray) -> np.ndarray:
     """Coordinate-wise medians over the images of the subject of each image, shape as `found_m` (n, k, 3).
 
-    Of what was never found of a subject they are 0.
+    For keypoints never found of a subject they are 0.
     """
     medians_m = np.zeros_like(found_m)
     for of in of_each(subjects):
@@ -226,5 +226,5 @@ def own_medians(found_m: np.ndarray, subjects: np.ndarray) -> np.ndarray:
 
 
 def of_each(subjects: np.ndarray) -> list[np.ndarray]:
-    """Which images (n_frames,) are of each subject, in the order in which they first occur."""
+    """Which images (n_frames,) are of each subject, in the order of first occurrence."""
     return [np.equal(subjects, subject) for subject in dict.fromkeys(subjects)]

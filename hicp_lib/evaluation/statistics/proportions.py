@@ -1,4 +1,4 @@
-"""Proportions of rows that are something, with intervals from drawing people, then whole source images."""
+"""Proportions of rows with a property, with intervals from resampling people, then whole source images."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -11,7 +11,7 @@ from hicp_lib.core.extras import needs
 from hicp_lib.evaluation.statistics.resampling import PERCENTILES, Draws, draw_counts, with_interval
 
 ALPHA, POWER = 0.05, 0.8
-_TAIL = PERCENTILES[0] / 100  # what an interval leaves out on either side
+_TAIL = PERCENTILES[0] / 100  # probability outside an interval on either side
 
 
 def proportions(rows: pd.DataFrame, by: Sequence[str], of: str, draws: Draws = Draws()) -> pd.DataFrame:
@@ -20,8 +20,8 @@ def proportions(rows: pd.DataFrame, by: Sequence[str], of: str, draws: Draws = D
     Parameters
     ----------
     rows : DataFrame
-        Has a column `source_image`; rows of one source image are drawn together. With a column `subject`,
-        subjects are drawn, then source images of each.
+        With a column `source_image`; rows of one source image are resampled together. With a column
+        `subject`, subjects are resampled, then source images of each.
     by : sequence of str
         Columns that make the groups.
     of : str
@@ -33,7 +33,7 @@ def proportions(rows: pd.DataFrame, by: Sequence[str], of: str, draws: Draws = D
     -------
     DataFrame
         Columns `by, value, low, high, n` (rows), `n_images` (source images) and, of rows with subjects,
-        `n_people`, groups in the order they first occur; no interval from fewer than `MIN_DRAWN` subjects,
+        `n_people`, groups in the order of first occurrence; no interval from fewer than `MIN_DRAWN` subjects,
         or source images of one.
 
     Examples
@@ -55,19 +55,19 @@ def proportions(rows: pd.DataFrame, by: Sequence[str], of: str, draws: Draws = D
 def paired_differences(
     rows: pd.DataFrame, by: Sequence[str], over: str, of: str, draws: Draws = Draws()
 ) -> pd.DataFrame:
-    """Mean of a column where another has one value, less that where it has another, on the same images.
+    """Differences of a column's mean between the values of another column, on the same images.
 
     Parameters
     ----------
     rows : DataFrame
-        Has a column `source_image`; rows of one source image, group and value of `over` are averaged. With a
-        column `subject`, subjects are drawn, then source images of each.
+        With a column `source_image`; rows of one source image, group and value of `over` are averaged. With a
+        column `subject`, subjects are resampled, then source images of each.
     by : sequence of str
         Columns that make the groups.
     over : str
         Column whose values are compared, all with all.
     of : str
-        Column of booleans or numbers; source images that lack one of a pair are left out of it.
+        Column of booleans or numbers; source images that lack one value of a pair are left out.
     draws : Draws, optional
         Of the bootstrap.
 
@@ -104,22 +104,22 @@ def paired_differences(
 def mean_with_interval(
     values: ArrayLike, clusters: ArrayLike, draws: Draws = Draws(), subjects: ArrayLike | None = None
 ) -> tuple[float, float, float]:
-    """Mean, and its 95 % percentile interval from drawing subjects, then clusters of each.
+    """Mean, and its 95 % percentile interval from resampling subjects, then clusters of each.
 
-    Flags that are all alike are alike in every draw; that does not make their share certain. There the
-    interval is the exact one of a share that is 0 or 1 (Clopper and Pearson), a subject counting once, or a
-    cluster where there is one subject only.
+    If all flags are equal, they are so in every draw, but their share is not certain. Then the exact interval
+    of a share of 0 or 1 is used (Clopper and Pearson), where each subject counts once, or each cluster if
+    there is only one subject.
 
     Parameters
     ----------
     values : array, shape (n,)
-        What is averaged.
+        The values to average.
     clusters : array, shape (n,)
-        Values of equal cluster are drawn together.
+        Values of the same cluster are resampled together.
     draws : Draws, optional
         Of the bootstrap.
     subjects : array, shape (n,), optional
-        Whose each value is; all of one when left out.
+        The subject of each value; by default one for all.
 
     Returns
     -------
@@ -148,22 +148,22 @@ def mean_with_interval(
 
 
 def variance_components(values: ArrayLike, subjects: ArrayLike) -> tuple[float, float]:
-    """Variance between subjects, and between frames of one: analysis of variance, one way, random effects.
+    """Variance between subjects, and between frames of one: one-way random-effects analysis of variance.
 
-    With K subjects of n frames each, the mean has the variance between / K + within / (K n).
+    With K subjects of n frames each, the variance of the mean is between / K + within / (K n).
 
     Parameters
     ----------
     values : array, shape (n_values,)
         NaN is left out.
     subjects : array, shape (n_values,)
-        Whose each is.
+        The subject of each value.
 
     Returns
     -------
     between, within : float
-        In the values' unit squared. NaN where there is only one subject, or one value of each; what comes out
-        below 0 is 0.
+        In the values' unit squared. NaN if there is only one subject, or one value of each; negative
+        estimates become 0.
 
     Examples
     --------
@@ -182,7 +182,7 @@ def variance_components(values: ArrayLike, subjects: ArrayLike) -> tuple[float, 
 
 
 def component_table(rows: pd.DataFrame, by: Sequence[str], of: str) -> pd.DataFrame:
-    """Variances between views, between people within a view, and between images of one, of groups of rows.
+    """Variances between views, people within a view, and images of a person, per group of rows.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def component_table(rows: pd.DataFrame, by: Sequence[str], of: str) -> pd.DataFr
 
 
 def smallest_difference(differences_by_subject: ArrayLike, power: float = POWER) -> float:
-    """The smallest true mean difference that so many subjects would show.
+    """The smallest true mean difference that this number of subjects could detect.
 
     Parameters
     ----------
@@ -220,8 +220,8 @@ def smallest_difference(differences_by_subject: ArrayLike, power: float = POWER)
     Returns
     -------
     float
-        In the differences' unit. NaN from fewer than two, and where all are alike: nothing is known there of
-        how they spread.
+        In the differences' unit. NaN with fewer than two, and if all are equal, since their spread is then
+        unknown.
 
     Examples
     --------

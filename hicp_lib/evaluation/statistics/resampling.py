@@ -1,14 +1,14 @@
-"""Resampling of people and of their frames by how often each is drawn: statistics in every draw at once.
+"""Bootstrap of people and their frames, as counts of how often each is drawn, for all draws at once.
 
 The first draw is the sample itself, each frame once; the others are the bootstrap's. People (*subjects*) are
-drawn, and in each of those drawn its frames: from one alone, frames only. Frames of a recording are alike for
-a while, so stretches of them may be drawn: a moving block bootstrap (Künsch, Annals of Statistics 1989).
+resampled, and then the frames of each; with one subject, frames only. Neighbouring frames of a recording are
+correlated, so stretches of them can be resampled: a moving block bootstrap (Künsch, Annals of Statistics
+1989).
 
-Percentiles that fit many people would make the intervals of few too narrow, so theirs lie further out
-(Hesterberg, The American Statistician 2015): where people differ more than their frames, those of a mean over
-10 people cover it in 95 % of samples. Where people hardly differ, frames count twice, and it is 99 %.
-
-How long the blocks of frames must be, `block_length` says.
+With few people, the usual percentiles would make intervals too narrow, so wider ones are used (Hesterberg,
+The American Statistician 2015): where people differ more than their frames, the intervals of a mean over 10
+people cover it in 95 % of samples. Where people hardly differ, the variance of frames is counted twice, and
+the coverage is 99 %. `block_length` gives the length of the blocks of frames.
 """
 
 from statistics import NormalDist
@@ -22,18 +22,18 @@ from hicp_lib.core.extras import needs
 from hicp_lib.core.memo import memoised
 
 PERCENTILES = (2.5, 97.5)  # of 95 % intervals
-MIN_DRAWN = 10  # a percentile interval from fewer covers far less than 95 %, and from one nothing
+MIN_DRAWN = 10  # a percentile interval from fewer has a coverage far below 95 %, from one none
 
 
 class Draws(NamedTuple):
-    """The draws of a bootstrap.
+    """Settings of a bootstrap.
 
     Attributes
     ----------
     n : int
-        How many.
+        Number of draws.
     seed : int
-        What they are drawn with.
+        Seed of the random numbers.
     """
 
     n: int = 1000
@@ -46,18 +46,19 @@ def draw_counts(frames: int | ArrayLike, draws: Draws, block_length: int = 1) ->
     Parameters
     ----------
     frames : int or array, shape (n,)
-        Number of frames of one subject, or whose each frame is; those of a subject in the order of time.
+        Number of frames of one subject, or the subject of each frame; frames of a subject in the order of
+        time.
     draws : Draws
-        None are made of fewer than `MIN_DRAWN` subjects, or of one with fewer blocks of frames: there is no
-        interval.
+        With fewer than `MIN_DRAWN` subjects, or one subject with fewer blocks of frames, there are none, and
+        so no interval.
     block_length : int, optional
-        Frames that are drawn together; cut to a subject's frames.
+        Frames that are drawn together; at most a subject's frames.
 
     Returns
     -------
     array of int, shape (1 + draws.n, n)
-        The first row is the sample itself, each once. A subject that is drawn gives as many frames as it has:
-        blocks that start anywhere, the last one cut.
+        The first row is the sample itself, each frame once. A drawn subject gives as many frames as it has,
+        in blocks that start anywhere, the last one cut.
 
     Examples
     --------
@@ -86,7 +87,7 @@ def _draw_counts(subjects: tuple[int, ...], draws: tuple[int, int], block_length
 
 
 def _draw_blocks(n: int, length: int, times: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """How often each of a subject's n frames is drawn, (draws, n), where it is drawn `times` (draws,)."""
+    """How often each of a subject's n frames is drawn, (draws, n), if it is drawn `times` (draws,)."""
     if length == 1:
         return rng.multinomial(n * times, np.full(n, 1 / n))
     draw = np.repeat(np.arange(len(times)), times)
@@ -104,15 +105,15 @@ def with_interval(draws: np.ndarray, n_people: int = 1) -> tuple[Any, Any, Any]:
     Parameters
     ----------
     draws : array, shape (n_draws, ...)
-        Draws in which nothing counts (NaN) are left out.
+        Draws without a value (NaN) are left out.
     n_people : int, optional
-        How many subjects the values are of: of several, the percentiles are those with which a mean's
-        interval is as wide as Student's. No interval from none, or from two to `MIN_DRAWN` - 1.
+        Number of subjects: with several, the percentiles are those that make a mean's interval as wide as
+        Student's. No interval with none, or with two to `MIN_DRAWN` - 1.
 
     Returns
     -------
     value, low, high : float or array, shape (...)
-        NaN where no draw is left.
+        NaN if no draw is left.
 
     Examples
     --------
@@ -138,19 +139,19 @@ def _percentiles(n_people: int) -> tuple[float, float]:
 
 
 def weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Medians of values that are each counted as often as its weight says; NaN is left out.
+    """Medians of values repeated by their weights; NaN is left out.
 
     Parameters
     ----------
     values : array, shape (n,) or (draws, n)
         One row per draw when every draw has its own.
     weights : array, shape (draws, n)
-        How often each counts.
+        How often each value is repeated.
 
     Returns
     -------
     array, shape (draws,)
-        What `np.nanmedian` of the repeated values is; NaN where none was drawn.
+        The `np.nanmedian` of the repeated values; NaN if none was drawn.
 
     Examples
     --------
@@ -171,7 +172,7 @@ def weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     counts = np.cumsum(drawn, axis=1)
     total = counts[:, -1]
     row = np.arange(len(weights)) if len(rows) > 1 else 0
-    # The first that reach half of the weight, and go beyond; of an odd number it is one twice.
+    # The first values that reach half of the weight, and exceed it; the same one for an odd number.
     half = total[:, None] / 2
     places = [reached.argmax(axis=1) for reached in (counts >= half, counts > half)]
     lower, upper = (rows[row, order[row, place]] for place in places)
@@ -185,19 +186,19 @@ _MAX_CORRELATION = 0.999
 def block_length(errors: np.ndarray, subjects: ArrayLike | None = None) -> int:
     """Length of the blocks, in frames, for medians and fractions of `errors`.
 
-    What a median or a fraction averages over time is on which side of a bound each error lies, and outliers
-    must not matter. So the serial correlation is taken from the *signs* of the errors about their median,
-    by the arcsine law of normal processes: rho = sin(pi/2 * correlation of neighbouring signs). As if of
-    an autoregressive process, the length is n^(1/3) (sqrt(6) rho / (1 - rho^2))^(2/3): Carlstein's rule
-    (Annals of Statistics 1986) in the form of Sherman, Speed and Speed (1998).
+    A median or a fraction depends on the side of a bound on which each error lies, and must not depend on
+    outliers. So the serial correlation is estimated from the *signs* of the errors about their median, by the
+    arcsine law of normal processes: rho = sin(pi/2 * correlation of neighbouring signs). For an
+    autoregressive process, the length is n^(1/3) (sqrt(6) rho / (1 - rho^2))^(2/3): Carlstein's rule (Annals
+    of Statistics 1986) in the form of Sherman, Speed and Speed (1998).
 
     Parameters
     ----------
     errors : array, shape (n_frames, n_series)
         NaN where missing; their correlations are averaged.
     subjects : array, shape (n_frames,), optional
-        Whose each frame is; of one subject when left out. Each has medians of its own, and as neighbours
-        count frames of one subject only.
+        The subject of each frame; by default one. Each has its own medians, and only frames of the same
+        subject are neighbours.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""The loop closed in simulation: the robot sees the person, gives way, and sees from its new posture.
+"""Closed-loop simulation: the robot sees the person, avoids, and sees from its new posture.
 
 Time advances in the controller's periods. Joints follow their velocities exactly, but are read with noise.
-The camera runs on its own; whenever the detector is free, it takes the next image, and what it makes of that
-reaches the loop after a stated latency. The person, too, sees the robot, and follows its hand.
+The camera runs independently; whenever the detector is free, it takes the next image, and its result reaches
+the loop after a stated latency. The person also sees the robot and follows its hand.
 """
 
 from collections import deque
@@ -27,33 +27,33 @@ from hicp_lib.simulation.body.identities import Subject
 
 MOUNT = "tilted"
 NECK_RAD = np.radians([3.0, 0.0, 4.0])
-"""How the robot holds its head: it looks at its left hand and at whoever comes for it."""
+"""Pose of the robot's head: it looks at its left hand and at a person who reaches for it."""
 STARTS_S = LOOKED_AT_S[0] - 0.2
-"""When runs begin; people are still far."""
+"""Start of runs, when people are still far."""
 HAND_COLUMNS = ("followed_x_m", "followed_y_m", "followed_z_m")
-_POSED_S = 0.1  # the person's skin is posed this often, and moves on straight lines in between
+_POSED_S = 0.1  # the person's skin is posed at this interval, and interpolated linearly
 _ROW_PERIODS = 2  # control periods from one row to the next
 
 
 @dataclass(frozen=True)
 class Latency:
-    """From light to keypoints in the loop, stated: one that is measured would differ by machine and by run.
+    """Stated latency from light to keypoints in the loop; a measured one would depend on the machine.
 
     Attributes
     ----------
     exposure_s : float
-        From the middle of the exposure to its end.
+        From the centre of the exposure to its end.
     transport_s : float
         Readout, cable and driver.
     queue_s : float
         Until the detector is free.
     inference_s : float
-        Detector and lifting, during which no other image is worked on.
+        Detector and lifting; no other image is processed meanwhile.
 
     Raises
     ------
     InputError
-        If one of them is no number of seconds.
+        If one of them is not a number of seconds.
     """
 
     exposure_s: float = 0.0
@@ -74,20 +74,20 @@ class Latency:
 
 @dataclass(frozen=True)
 class Trial:
-    """What is simulated.
+    """A trial to simulate.
 
     Attributes
     ----------
     script : str
-        What the person does, a key of `SCRIPTS` or `BYSTANDERS`.
+        The person's behaviour, a key of `SCRIPTS` or `BYSTANDERS`.
     duration_s : float
-        For how long.
+        Duration of the trial.
     subject : Subject
-        Who the person is; draws room and noise too.
+        The person; also determines room and noise.
     camera_hz : float
-        Images per second, if perception is as fast.
+        Images per second, if perception keeps up.
     follow_m_s : float
-        How fast the person follows the robot's hand at most; 0: they go where it was at first.
+        Maximum speed with which the person follows the robot's hand; 0: they go to its initial position.
     joint_noise_rad : float
         Standard deviation of each reading of a joint.
     """
@@ -101,11 +101,11 @@ class Trial:
 
 
 Perceive = Callable[[Moment, Posture, Posture], Perception]
-"""Who is there at a moment, as seen from the robot's posture, the same again as the robot knows it."""
+"""Perceives the people at a moment, from the robot's posture, and that posture as the robot measures it."""
 
 
 def true_keypoints(moment: Moment, posture: Posture, read: Posture) -> Perception:
-    """The upper bound: every keypoint where it is, hidden or not.
+    """The upper bound: all true keypoints, including occluded ones.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def true_keypoints(moment: Moment, posture: Posture, read: Posture) -> Perceptio
 
 
 class Follower:
-    """The person of a trial: takes the robot's hand to be where it was a while ago, and goes there.
+    """The person of a trial, who moves to where the robot's hand was a reaction time ago.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class Follower:
         self._followed_m = [np.array(HOME_M["left"])]  # every `_POSED_S`
 
     def see(self, time_s: float, hand_m: np.ndarray) -> None:
-        """Where the robot's hand is at a time; in the order of time, at least every `REACTION_S` / 2."""
+        """Record the position of the robot's hand; in the order of time, at least every `REACTION_S` / 2."""
         self._hands.append((time_s, hand_m))
         while len(self._followed_m) * _POSED_S < min(time_s + REACTION_S / 2, LEAVES_S[0]) + 1e-9:
             then_s, last_m = len(self._followed_m) * _POSED_S - REACTION_S, self._followed_m[-1]
@@ -145,12 +145,12 @@ class Follower:
             self._followed_m.append(last_m + share * away_m)
 
     def moment(self, time_s: float) -> Moment:
-        """What there is at a time, no later than `_POSED_S` after what was seen last."""
+        """The moment at a time, at most `_POSED_S` after the last recorded one."""
         before = min(int(time_s / _POSED_S + 1e-9), len(self._followed_m) - 1)
         after = min(before + 1, len(self._followed_m) - 1)
         first_m, then_m = self._followed_m[before], self._followed_m[after]
         hand_m = first_m + min(time_s / _POSED_S - before, 1.0) * (then_m - first_m)
-        # A robot that nobody threatens moves by less: everybody then sees the same.
+        # A robot without a threat moves by less, so that all conditions then see the same.
         return Moment(self.trial.script, self.trial.subject, time_s, tuple(hand_m.round(3).tolist()))
 
     def skin_m(self, time_s: float) -> np.ndarray:
@@ -167,7 +167,7 @@ def _skin_m(moment: Moment) -> np.ndarray:
 
 @memoised()
 def start_posture() -> Posture:
-    """How the robot stands before anybody comes: the left hand at its post, the head looking at it."""
+    """Initial posture of the robot: the left hand at its post, the head looking at it."""
     return replace(home_posture(load_icub()), neck_rad=NECK_RAD)
 
 
@@ -178,17 +178,17 @@ def simulate(
     avoids: bool = True,
     settings: Settings | None = None,
 ) -> pd.DataFrame:
-    """One run of a trial, from shortly before what the robot sees begins to matter.
+    """One run of a trial, from shortly before the robot's perception becomes relevant.
 
     Parameters
     ----------
     trial : Trial
     perceive : callable
-        As `Perceive` says.
+        A `Perceive`.
     latency : Latency, optional
-        From the image to when the loop knows.
+        From the image to the loop.
     avoids : bool, optional
-        Whether the robot gives way at all.
+        Whether the robot avoids at all.
     settings : Settings, optional
         The controller's.
 
@@ -197,8 +197,8 @@ def simulate(
     pd.DataFrame
         A row per two control periods: `t_s`, `distance_m` between robot and person, `activations` of all
         taxels (a list) and `activation`, the highest, `status`, `hand_error_m` (from the post), a column per
-        joint in radians, `HAND_COLUMNS` (where the person takes the hand to be), and `seen_s`, when the
-        newest image that the loop knows was taken (NaN: none yet).
+        joint in radians, `HAND_COLUMNS` (the hand's position as the person sees it), and `seen_s`, the time
+        of the newest image in the loop (NaN: none yet).
     """
     icub, posture, person = load_icub(), start_posture(), Follower(trial)
     rng = trial.subject.stream(trial.script, "joints")
@@ -222,7 +222,7 @@ def simulate(
 
 
 def between_s(trial: Trial, latency: Latency) -> float:
-    """From one image to the next: the camera's first one after the detector is free again.
+    """Interval between processed images: the camera's first one after the detector is free again.
 
     Examples
     --------
@@ -233,9 +233,9 @@ def between_s(trial: Trial, latency: Latency) -> float:
 
 
 def _loop(icub: ICub, posture: Posture, late_s: float, avoids: bool, settings: Settings) -> AvoidanceLoop:
-    """The loop, where the next perception may come `late_s` after the last one's image."""
+    """The loop, for perceptions that arrive up to `late_s` after the last one's image."""
     controller = Controller(icub, np.array(HOME_M["left"]), posture.angles("left"), settings=settings)
-    # A perception holds until the next one can be there, so that slow detectors do not blink.
+    # A perception holds until the next one is due, so that keypoints of slow detectors do not flicker.
     hold_s = max(Trust().hold_s, late_s)
     tracker = KeypointTracker(Trust(hold_s=hold_s, memory_s=Trust().memory_s + hold_s))
     return AvoidanceLoop(controller, tracker=tracker, avoids=avoids)

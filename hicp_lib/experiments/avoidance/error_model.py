@@ -1,10 +1,10 @@
-"""A detector as its errors: what it found of people in rendered runs, drawn again without rendering.
+"""A model of a detector's errors, estimated in rendered runs and sampled without rendering.
 
-Keypoints go in groups (`GROUPS`), each found or lost as a whole. Whether a group is found depends on whether
-it can be seen, roughly, and on whether it was found in the image before. What is found is off by a vector
-that all its keypoints share: the detector's bias, a part that lasts (drawn once for a person) and one that
-changes from image to image. All of it is estimated per group, in the robot's root frame. What is found more
-than `ELSEWHERE_M` away from the person's own is not modelled: it counts as lost.
+Keypoints form groups (`GROUPS`), each found or lost as a whole. Whether a group is found depends on whether
+it is roughly visible, and on whether it was found in the image before. The keypoints of a found group share
+an error vector: the detector's bias, a constant part (sampled once per person) and a part that changes from
+image to image. All are estimated per group, in the robot's root frame. Detections more than `ELSEWHERE_M`
+away from the person's own keypoints are not modelled and count as lost.
 """
 
 from dataclasses import dataclass
@@ -28,13 +28,13 @@ GROUPS = {
     "left hand": LEFT_HAND, "right hand": RIGHT_HAND, "legs": np.array([13, 14, 15, 16, *range(20, 26)]),
 }  # fmt: skip
 ELSEWHERE_M = 0.25
-_CELL_PX = 16  # of the coarse image that tells what hides what
-_FLESH_M = 0.08  # a keypoint may lie so far behind what is seen
+_CELL_PX = 16  # of the coarse image for occlusion
+_FLESH_M = 0.08  # a keypoint this far behind the surface is still visible
 _OFFSETS = ["x_m", "y_m", "z_m"]
 
 
 def in_sight(moment: Moment, posture: Posture) -> np.ndarray:
-    """Which groups the robot can see about half of, or more: neither outside the image nor hidden.
+    """Groups of which the robot sees about half or more: neither outside the image nor occluded.
 
     Parameters
     ----------
@@ -64,16 +64,16 @@ def in_sight(moment: Moment, posture: Posture) -> np.ndarray:
 
 
 def found_groups(points_m: np.ndarray, is_sure: np.ndarray, truth_m: np.ndarray) -> np.ndarray:
-    """How far each group of the true person was found off, of an image; NaN where it was not.
+    """Errors of each group of the true person in an image; NaN where it was not found.
 
-    Which of two hands or arms it is matters to names, not to distances: the nearer counts.
+    Left and right do not matter for distances: the nearer of the two is used.
 
     Parameters
     ----------
     points_m : array, shape (p, 136, 3)
-        Of all people found.
+        Of all detected people.
     is_sure : array of bool, shape (p, 136)
-        Those that are believed.
+        Those with a sufficient score.
     truth_m : array, shape (136, 3)
 
     Returns
@@ -95,17 +95,17 @@ def found_groups(points_m: np.ndarray, is_sure: np.ndarray, truth_m: np.ndarray)
 
 @dataclass(frozen=True, eq=False)
 class ErrorModel:
-    """What `fit` estimates, a row per group of `GROUPS`.
+    """The estimates of `fit`, a row per group of `GROUPS`.
 
     Attributes
     ----------
     found_share : array, shape (n_groups, 2, 2)
-        By whether it can be seen, and whether it was found in the image before.
+        By whether it is visible, and whether it was found in the image before.
     bias_m : array, shape (n_groups, 3)
     lasting_m2, passing_m2 : array, shape (n_groups, 3, 3)
         Covariances between people, and from image to image.
     burst_images : float
-        How many images in a row nothing is found of somebody, on average.
+        Average number of consecutive images without any detection of a person.
     """
 
     found_share: np.ndarray
@@ -135,7 +135,7 @@ def fit(sightings: pd.DataFrame) -> ErrorModel:
         rows = table[table["group"] == group]
         n = rows.groupby(["in_sight", "before"])["found"].agg(["sum", "count"])
         n = n.reindex(pd.MultiIndex.from_product([(False, True)] * 2), fill_value=0)
-        # Half a case of either kind: what was never met is not impossible.
+        # Half a case of either kind, so that unobserved cases are not impossible.
         shares.append(((n["sum"] + 0.5 * rows["found"].mean()) / (n["count"] + 0.5)).to_numpy().reshape(2, 2))
         found = rows[rows["found"]]
         means = found.groupby("run")[_OFFSETS].transform("mean")
@@ -154,15 +154,15 @@ def _covariance(offsets_m: pd.DataFrame) -> np.ndarray:
 
 
 def modelled(model: ErrorModel, rng: np.random.Generator) -> Perceive:
-    """Perceives what a detector with a model's errors would find.
+    """A `Perceive` with a model's errors.
 
-    How well the robot knows its joints is part of the errors.
+    The errors include those of the robot's joint readings.
 
     Parameters
     ----------
     model : ErrorModel
     rng : numpy.random.Generator
-        Of everything that is drawn.
+        For all random numbers.
 
     Returns
     -------
@@ -190,16 +190,16 @@ def modelled(model: ErrorModel, rng: np.random.Generator) -> Perceive:
 
 
 def lossy(whole: Perceive, lost_share: float, burst_images: float, rng: np.random.Generator) -> Perceive:
-    """Loses images of another way to perceive in bursts: in those nobody is found.
+    """A `Perceive` that loses images of another one in bursts: in those, nobody is found.
 
     Parameters
     ----------
     whole : callable
-        The other way.
+        The other one.
     lost_share : float
         Of all images, below 1.
     burst_images : float
-        How many in a row on average; more where the share asks for it.
+        Average number in a row; more if the share requires it.
     rng : numpy.random.Generator
 
     Returns

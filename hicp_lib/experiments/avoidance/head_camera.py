@@ -1,7 +1,7 @@
-"""The camera on the robot's head: image and depth image, a detector, the lifting; and an onlooker's view.
+"""The camera on the robot's head: image and depth image, detector, lifting; and an external view.
 
-The camera sits on the moving robot and sees the robot's own arms; keypoints on them are left out, since
-where the robot is, is known. An onlooker sees all of the robot.
+The camera is on the moving robot and sees the robot's own arms; keypoints on them are removed, since the
+robot's pose is known. The external view shows the whole robot.
 """
 
 import time
@@ -32,12 +32,12 @@ from hicp_lib.simulation.rendering.surfaces import Look, Surface
 RgbdImage = tuple[np.ndarray, np.ndarray]
 """Image (480, 640, 3), RGB uint8, and depth in metres (480, 640)."""
 ImageCache = MutableMapping[Moment, RgbdImage]
-_AT_POST_RAD = 2e-3  # a robot that nobody threatens moves less
+_AT_POST_RAD = 2e-3  # a robot without a threat moves less
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """One image and what was made of it.
+    """One image and its results.
 
     Attributes
     ----------
@@ -47,9 +47,9 @@ class Observation:
     rgb : array, shape (480, 640, 3), dtype uint8
     detections : Detections
     perception : Perception
-        The robot's own body left out.
+        Without the robot's own body.
     time_ms : float
-        What detector and lifting took on this machine. It moves nothing that is simulated.
+        Time of detector and lifting on this machine. It does not influence the simulation.
     """
 
     moment: Moment
@@ -62,16 +62,16 @@ class Observation:
 
 @dataclass(eq=False)
 class HeadCamera:
-    """The camera on the head with a detector behind it; keeps what it saw.
+    """The camera on the head with a detector; stores its observations.
 
     Attributes
     ----------
     detector : Detector
-        Looks at the images.
+        Run on the images.
     lifting : str
         One of `hicp_lib.lifting.robust.METHODS`.
     images : mapping
-        Images taken from the robot's post; until it first gives way, all detectors see the same.
+        Images taken at the robot's post, which all detectors share until it first moves.
     observations : list of Observation
         All so far.
     """
@@ -82,9 +82,9 @@ class HeadCamera:
     observations: list[Observation] = field(default_factory=list)
 
     def perceive(self, moment: Moment, posture: Posture, read: Posture) -> Perception:
-        """Render what is to be seen, find people and lift them; remember all of it.
+        """Render the view, detect people and lift them; store the observation.
 
-        Outside `LOOKED_AT_S` nothing is rendered, and nobody found.
+        Outside `LOOKED_AT_S` nothing is rendered or detected.
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class HeadCamera:
         posture : Posture
             The robot's.
         read : Posture
-            The same as the robot knows it.
+            The same as measured by the robot.
 
         Returns
         -------
@@ -119,12 +119,12 @@ class HeadCamera:
 
 
 def photograph(moment: Moment, posture: Posture) -> RgbdImage:
-    """What the camera on the head takes.
+    """An image of the camera on the head.
 
     Parameters
     ----------
     moment : Moment
-        Its subject and time draw the noise.
+        Its subject and time determine the noise.
     posture : Posture
         The robot's.
 
@@ -177,7 +177,7 @@ def robot_surfaces(icub: ICub, posture: Posture, whole: bool = False) -> list[Su
     icub : ICub
     posture : Posture
     whole : bool, optional
-        With what the camera on its own head does not see.
+        With the parts that the camera on its head does not see.
 
     Returns
     -------
@@ -199,8 +199,8 @@ CAMERA = PlacedCamera(480, 384, 490.0, 490.0, 239.5, 191.5, look_at(_EYE_M, _TAR
 _SENSOR = Sensor(np.ones(3), exposure=1.15, blur_px=0.35, vignette=0.0, shot_noise=0.0, read_noise=0.0)
 _FLOOR = Surface(quad([-6, -6, 0], [12, 0, 0], [0, 12, 0]), plain(np.full(3, 0.62), 0.9, 0.0))
 _BACKDROP = np.full(3, 0.75)
-_SHARP = 1  # an owner: what belongs to somebody is drawn at every pixel
-_MARGIN_M = 0.35  # what lies within this of the person belongs to the scene, such as their chair
+_SHARP = 1  # a person index, so that it is rendered at every pixel
+_MARGIN_M = 0.35  # objects this close to the person belong to the scene, such as the chair
 
 
 def onlooker_view(world: World, robot: list[Surface]) -> np.ndarray:

@@ -1,10 +1,10 @@
-"""What people do before the robot, as scripts: they come for its left hand and follow it, or stand by.
+"""Scripted behaviour of people near the robot: they reach for its left hand, or are bystanders.
 
-The paper's three trials (section IV-E): sitting, they reach for the hand with theirs; standing, they do;
-sitting, they approach it with the head. Unless the robot gives way, the person's skin comes within
-`CONTACT_M` of it; if it does, they follow the hand as it was `REACTION_S` ago, as far as they can reach. Two
-scripts of bystanders (`BYSTANDERS`), who come no nearer than `BYSTAND_M`: one gestures, one passes by. Every
-script has the same phases (`PHASES_S`): far, getting ready, approach, near, leaving, far again.
+The paper's three trials (section IV-E): reaching for the robot's hand with a hand, sitting and standing, and
+approaching it with the head, sitting. Unless the robot avoids, the person's skin comes within `CONTACT_M` of
+it; if it does, they follow the hand's position of `REACTION_S` ago, as far as they can reach. Two scripts of
+bystanders (`BYSTANDERS`), who stay at least `BYSTAND_M` away: one gestures, one passes by. Every script has
+the same phases (`PHASES_S`): far, getting ready, approach, near, leaving, far again.
 """
 
 from collections.abc import Callable, Iterable
@@ -30,17 +30,17 @@ from hicp_lib.simulation.rendering.render import World
 from hicp_lib.simulation.rendering.surfaces import Surface
 
 PHASES_S = {"far": 0.6, "ready": 0.9, "approach": 1.1, "near": 1.0, "leave": 1.0}
-"""How long the person is far, takes to get ready, to approach, stays near, and takes to leave."""
+"""Durations for which the person is far, gets ready, approaches, stays near, and leaves."""
 READY_S = PHASES_S["far"] + PHASES_S["ready"]
 NEAR_S = READY_S + PHASES_S["approach"]
-"""When the person begins to approach, and when they are as near as they would come to a robot that stays."""
+"""Start of the approach, and its end, when the person is as near as they would come to a still robot."""
 LEAVES_S = NEAR_S + PHASES_S["near"], sum(PHASES_S.values())
-"""When the person begins to leave, and has left."""
+"""Start and end of leaving."""
 LOOKED_AT_S = READY_S - 0.3, LEAVES_S[0] + 0.3
-"""When it matters what the robot sees; before and after, people are too far away."""
+"""Period in which perception matters; before and after, people are too far away."""
 CONTACT_M, BYSTAND_M = 0.01, 0.36
 REACTION_S = 0.2
-"""How old what the person acts on is: eyes to arm (150 to 200 ms to a target that jumps)."""
+"""Visual reaction time of the person (150 to 200 ms to a target that jumps)."""
 
 _DEG = lab.MOVEMENTS["reaching_deg"]
 _LEANS_DEG = np.arange(0.0, 100.1, 5.0)  # how far the trunk bends in all; the neck no further
@@ -59,21 +59,21 @@ _SEAT_M = 0.11  # how far below the pelvis's origin a seat is
 # Where elbows go, see `reach`: with the hands in the lap, and of the arm that reaches.
 _ELBOW_AT_REST, _ELBOW_REACHING = (-0.5, 0.7, -0.5), (-0.2, 0.5, -0.9)
 Reach = Callable[[np.ndarray], Posture]
-"""From where the robot's hand is taken to be (3,), root frame, to how the person then touches it."""
+"""From an assumed position of the robot's hand (3,), root frame, to the person's posture touching it."""
 
 
 @dataclass(frozen=True)
 class Staging:
-    """How a script is staged.
+    """Staging of a script.
 
     Attributes
     ----------
     sits : bool
         Whether the person sits.
     place_m : tuple of float
-        Where on the floor they are (x, y), world frame.
+        Position on the floor (x, y), world frame.
     by : str
-        What they come with: "hand", "head", or as bystanders "gesture" or "passing".
+        What approaches: "hand", "head", or for bystanders "gesture" or "passing".
     """
 
     sits: bool
@@ -89,7 +89,7 @@ BYSTANDERS, SCRIPTS = (
 
 @dataclass(frozen=True, eq=False)
 class Script:
-    """A trial ready to be looked at; times in seconds from its beginning.
+    """A trial ready for rendering; times in seconds from its start.
 
     Attributes
     ----------
@@ -100,9 +100,9 @@ class Script:
     appearance : Appearance
         The person's.
     rest, ready : minimum_jerk.Posture
-        How they are before, and from where they approach.
+        Posture before, and at the start of the approach.
     touch : callable
-        How they are when they touch the robot's hand, see `Reach`.
+        Posture when they touch the robot's hand, see `Reach`.
     """
 
     name: str
@@ -113,7 +113,7 @@ class Script:
     touch: Reach
 
     def posture_at(self, time_s: float, hand_m: np.ndarray) -> Posture:
-        """What the person does at a time, if they take the robot's hand to be at a place (3,), root frame."""
+        """The person's posture at a time, for an assumed position of the robot's hand (3,), root frame."""
         if time_s <= READY_S:
             return _way(self.rest, self.ready, (time_s - PHASES_S["far"]) / PHASES_S["ready"])
         there = self.touch(hand_m)
@@ -124,7 +124,7 @@ class Script:
 
 @dataclass(frozen=True)
 class Moment:
-    """All that a script shows at a time.
+    """The state of a script at a time.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ class Moment:
     subject : Subject
     time_s : float
     hand_m : tuple of float
-        Where the person takes the robot's hand to be, root frame.
+        The robot's hand as the person sees it, root frame.
     """
 
     script: str
@@ -142,17 +142,17 @@ class Moment:
 
     @property
     def person(self) -> PosedBody:
-        """The person, not dressed, in the world."""
+        """The person's body, without clothes, in the world."""
         return _person(self._still)
 
     def world(self, robot: list[Surface]) -> World:
-        """All there is to see, with the robot as it is then."""
+        """The scene at this time."""
         room = script(self.script, self.subject).room
         return replace(room, surfaces=[*room.surfaces, *_worn(self._still), *robot])
 
     @property
     def _still(self) -> "Moment":
-        # Whoever keeps still is posed and dressed once.
+        # A still person is posed and dressed only once.
         return replace(self, time_s=float(np.clip(self.time_s, PHASES_S["far"], LEAVES_S[1])))
 
 
@@ -204,7 +204,7 @@ def _by_hand(shape: str, rest: Posture, gap_m: float = CONTACT_M) -> tuple[Postu
 
 
 def _by_gesture(shape: str, rest: Posture) -> tuple[Posture, Posture, Reach]:
-    """The right hand comes near, not to the robot, and goes again."""
+    """The right hand comes near the robot, but does not touch it, and leaves."""
     rest, ready, touch = _by_hand(shape, rest, BYSTAND_M)
     near = touch(np.array(HOME_M["left"]))
     return rest, ready, lambda hand_m: near
@@ -219,7 +219,7 @@ def _by_passing(shape: str, rest: Posture) -> tuple[Posture, Posture, Reach]:
 
 
 def _by_head(shape: str, rest: Posture) -> tuple[Posture, Posture, Reach]:
-    """Far, ready and near for the head: the trunk bends forward until it is there, and no other way."""
+    """Far, ready and near for the head: only the trunk bends forward to approach."""
     near_deg = _contact(_LEANS_DEG, lambda lean_deg: _distance_m(shape, _leaning(rest, lean_deg)))
     bodies = [lab.posed(shape, _leaning(rest, lean_deg)) for lean_deg in _LEANS_DEG]
     skin_m = lab.in_root(lab.posed(shape, _leaning(rest, near_deg)).vertices_m)
@@ -239,7 +239,7 @@ _WAYS = {"hand": _by_hand, "head": _by_head, "gesture": _by_gesture, "passing": 
 
 
 def _contact(way: Iterable[float], distance_m: Callable[[float], float], gap_m: float = CONTACT_M) -> float:
-    """Where on a way the distance first falls to `gap_m`; the way's end if it does not."""
+    """Position on a path where the distance first falls to `gap_m`; the path's end if it does not."""
     before, *further = way
     for after in [before, *further]:
         if distance_m(after) < gap_m:
@@ -276,14 +276,14 @@ def _rest(rng, shape: str, staging: Staging) -> Posture:
 
 
 def _leaning(posture: Posture, lean_deg: float) -> Posture:
-    """The trunk bent forward by an angle, shared by hips, spine and neck."""
+    """The trunk bent forward by an angle, distributed over hips, spine and neck."""
     lean = float(np.radians(lean_deg))
     bent = {joint: share * lean for joint, share in _LEAN_SHARES.items()}
     return replace(posture, joints=posture.joints | bent)
 
 
 def _leaning_reach(shape: str, rest: Posture) -> Reach:
-    """How the right wrist comes to a point of the root frame, the trunk no further bent than that takes."""
+    """A posture with the right wrist at a point in the root frame, bending the trunk no more than needed."""
     body, pelvis_m, to_body = load_body(), lab.posed(shape, rest).heads_m[0], lab.facing_robot(0.0)[:3, :3].T
     arm = [body.bone_numbers[f"{name}.R"] for name in ("upperarm01", "lowerarm01", "wrist")]
     shoulders_m = []
@@ -309,6 +309,6 @@ def _leaning_reach(shape: str, rest: Posture) -> Reach:
 
 
 def _bent(rest: Posture, lean_deg: float) -> tuple[dict[str, float], float]:
-    """Joints of a bent trunk without the pelvis, and how far that leans (radians)."""
+    """Joints of a bent trunk without the pelvis, and the pelvis's angle (radians)."""
     joints = dict(_leaning(rest, lean_deg).joints)
     return joints, joints.pop(lab.PELVIS_LEAN)

@@ -1,7 +1,7 @@
 """Runs of the closed loop, one per script and condition: simulated in parallel, cached.
 
-A run is cached under a key of all it depends on: trial, condition, latency, the detector's settings and
-weights, and the code and data of simulation, lifting, robot and detectors.
+A run is cached under a key of everything it depends on: trial, condition, latency, the detector's settings
+and weights, and the code and data of simulation, lifting, robot and detectors.
 """
 
 import multiprocessing
@@ -35,14 +35,14 @@ from hicp_lib.robot.controller import PUBLISHED
 
 NO_AVOIDANCE, TRUE_KEYPOINTS = "no avoidance", "ground truth"
 IDEAL = (NO_AVOIDANCE, TRUE_KEYPOINTS)
-"""Conditions without a detector; every other one begins with a detector's name."""
+"""Conditions without a detector; all others start with a detector's name."""
 TRACKING = ", tracking"
-"""After MediaPipe's name: each image is searched where the person was in the one before."""
+"""Suffix of MediaPipe's name: each image is searched near the person's position in the one before."""
 PUBLISHED_GAINS = ", published gains"
-"""At the end of a condition: the controller's gains are the published ones, not the project's own."""
+"""Suffix of a condition with the controller's published gains, instead of the project's own."""
 
 _TABLES = ("cycles.parquet", "frames.parquet")
-_SHOWN_PX = (320, 240)  # cached images are for looking at
+_SHOWN_PX = (320, 240)  # cached images are only for display
 _JPEG_QUALITY = 88
 _KEY_LENGTH = 24  # of a run's folder
 
@@ -55,11 +55,11 @@ class Job:
     ----------
     trial : Trial
     condition : str
-        One of `IDEAL` or a detector's name, `TRACKING` and `PUBLISHED_GAINS` after it where they apply.
+        One of `IDEAL` or a detector's name, with the suffixes `TRACKING` and `PUBLISHED_GAINS` if they apply.
     latency : Latency
-        From the image to when the loop knows.
+        From the image to the loop.
     lifting : str
-        Of keypoints that a detector found, "robust" or "paper".
+        Lifting method of detected keypoints, "robust" or "paper".
     """
 
     trial: Trial
@@ -69,29 +69,29 @@ class Job:
 
     @property
     def detector(self) -> str:
-        """The condition without the gains."""
+        """The condition without the suffix of the gains."""
         return self.condition.removesuffix(PUBLISHED_GAINS)
 
     @property
     def gains(self) -> str:
-        """Whose gains the controller has."""
+        """Name of the controller's gains."""
         return "published" if self.condition.endswith(PUBLISHED_GAINS) else "ours"
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What happened in a run.
+    """Results of a run.
 
     Attributes
     ----------
     job : Job
-        What was run.
+        The job.
     cycles : pd.DataFrame
         A row per two control periods, see `closed_loop.simulate`.
     frames : pd.DataFrame
-        A row per image: `t_s`, `time_ms` (what detector and lifting took, measured), `jpeg` (bytes),
+        A row per image: `t_s`, `time_ms` (measured time of detector and lifting), `jpeg` (bytes),
         and as flat lists `keypoints_px`, `scores` and `keypoints_m` (root frame) of all people,
-        `truth_m` of the one there is, and of `error_model.GROUPS` which could be seen (`in_sight`).
+        `truth_m` of the simulated person, and which of `error_model.GROUPS` were visible (`in_sight`).
     """
 
     job: Job
@@ -100,11 +100,11 @@ class Run:
 
 
 def run_all(jobs: Iterable[Job]) -> list[Run]:
-    """The runs of all jobs, in their order; what is not in the cache is simulated on all cores."""
+    """The runs of all jobs, in their order; runs that are not cached are simulated on all cores."""
     jobs, out = list(jobs), cache_dir() / "avoidance"
     folders = {job: out / _run_key(job) for job in jobs}
     missing = [job for job, folder in folders.items() if not (folder / _TABLES[0]).is_file()]
-    # The longest first, so that no core is left with one at the end: detectors, the fastest see most.
+    # The longest first, to balance the load: detectors, of which the fastest process most images.
     missing.sort(key=lambda job: (job.detector in IDEAL, job.latency.inference_s))
     workers = resolved(None)
     is_shared = isinstance(workers, int) and len(missing) > 1
@@ -154,7 +154,7 @@ def image(frame: pd.Series) -> tuple[np.ndarray, Detections]:
 
 
 def keypoints_m(frame: pd.Series) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What was perceived (p, 136, 3) and its scores (p, 136), and the truth (136, 3), in the root frame."""
+    """Perceived keypoints (p, 136, 3) with scores (p, 136), and the truth (136, 3), in the root frame."""
     perceived_m, scores, (truth_m,) = (
         _array(frame[name], width) for name, width in (("keypoints_m", 3), ("scores", 1), ("truth_m", 3))
     )
@@ -162,14 +162,14 @@ def keypoints_m(frame: pd.Series) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def moment_at(run: Run, time_s: float) -> Moment:
-    """What there is in a run at a time: where the person is depends on what the robot did."""
+    """The moment of a run at a time; the person's position depends on the robot's motion."""
     row = run.cycles.iloc[int((run.cycles["t_s"] - time_s).abs().argmin())]
     hand_m = tuple(float(row[column]) for column in loop.HAND_COLUMNS)
     return Moment(run.job.trial.script, run.job.trial.subject, float(time_s), hand_m)
 
 
 def _simulate(out: Path, run: str, job: Job, images: ImageCache) -> None:
-    """Simulate a run and write its tables; it counts as finished when the first of them is there."""
+    """Simulate a run and write its tables; it counts as finished when the first of them exists."""
     camera = None if job.detector in IDEAL else HeadCamera(_detector(job), job.lifting, images)
     perceive, avoids = camera.perceive if camera else loop.true_keypoints, job.detector != NO_AVOIDANCE
     settings = PUBLISHED if job.gains == "published" else None
@@ -200,18 +200,18 @@ def _array(flat: np.ndarray, width: int) -> np.ndarray:
 
 def _run_key(job: Job) -> str:
     known = {} if job.detector in IDEAL else identity(_detector(job))
-    # Of the detectors only the one that looks has a say, and its identity says which.
+    # Only the used detector influences the run, and its identity is part of the key.
     return key([run_all], without=[make_detector.__module__], job=job, detector=known)[:_KEY_LENGTH]
 
 
 def _known(*conditions: str) -> dict:
-    """What runs under some conditions follow from, here; a detector's tracking is in the code."""
+    """What runs under some conditions depend on, on this machine; a detector's tracking is in the code."""
     names = {condition.removesuffix(TRACKING) for condition in conditions} - {*IDEAL}
     return code_identity(__name__) | {name: identity(_kept_detector(name)) for name in sorted(names)}
 
 
 def _detector(job: Job) -> Detector:
-    """Made once in every process; one that tracks anew for each run, which begins with nobody seen."""
+    """Made once per process; a tracking one is new for each run, which starts without a person."""
     if not job.detector.endswith(TRACKING):
         return _kept_detector(job.detector)
     every_s = loop.between_s(job.trial, job.latency)

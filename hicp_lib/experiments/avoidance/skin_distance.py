@@ -1,7 +1,7 @@
-"""How far a person is from the robot, exactly as the simulation has it: what avoidance is judged by.
+"""Exact distance between person and robot in the simulation, by which avoidance is evaluated.
 
-The robot is its taxels, and its arms as thick lines; the person is the skin of the body model, without
-clothes and hair. The robot's fingers are left out.
+The robot is represented by its taxels, and its arms by capsules; the person by the skin of the body model,
+without clothes and hair. The robot's fingers are left out.
 """
 
 import numpy as np
@@ -13,9 +13,9 @@ from hicp_lib.robot.segments import body_segments
 from hicp_lib.robot.skin import read_skin
 
 FAR_M = 0.6
-"""Distances are not told apart beyond this."""
+"""Distances are limited to this value."""
 _STEP_M = 0.01
-_SOME = 32  # of so many vertices one is looked at first
+_SOME = 32  # one in this number of vertices is checked first
 
 
 def robot_spheres(icub: ICub, posture: Posture) -> tuple[np.ndarray, np.ndarray]:
@@ -43,7 +43,7 @@ def robot_spheres(icub: ICub, posture: Posture) -> tuple[np.ndarray, np.ndarray]
 
 
 def skin_distance_m(spheres: tuple[np.ndarray, np.ndarray], vertices_m: np.ndarray) -> float:
-    """Least distance between robot and person in metres, at most `FAR_M`; 0 where they touch.
+    """Smallest distance between robot and person in metres, at most `FAR_M`; 0 if they touch.
 
     To the nearest vertex of the person's mesh, which on hands is at most a few millimetres too far.
 
@@ -65,7 +65,7 @@ def skin_distance_m(spheres: tuple[np.ndarray, np.ndarray], vertices_m: np.ndarr
     0.07
     """
     places, radii = spheres
-    # Some of the vertices say how far the others may be that count.
+    # Some of the vertices give an upper bound for the others.
     some_m = _gaps_m(places, vertices_m[::_SOME], FAR_M).min()
     within_m = float(min(some_m, FAR_M) + radii.max())
     low, high = places.min(axis=0) - within_m, places.max(axis=0) + within_m
@@ -79,5 +79,5 @@ def _gaps_m(to_m: np.ndarray, from_m: np.ndarray, within_m: float) -> np.ndarray
     """Distances (k,) of points `from_m` (k, 3) from the nearest of `to_m`; infinite beyond `within_m`."""
     if not len(to_m):
         return np.full(len(from_m), np.inf)
-    tree = cKDTree(to_m, balanced_tree=False, compact_nodes=False)  # asked once, so built in haste
+    tree = cKDTree(to_m, balanced_tree=False, compact_nodes=False)  # used once, so built quickly
     return tree.query(from_m, distance_upper_bound=within_m)[0]

@@ -1,6 +1,7 @@
-"""Many runs of the closed loop without rendering: true keypoints, or ones with a detector's errors.
+"""Many runs of the closed loop without rendering: with true keypoints, or with a detector's error model.
 
-Of every run only the least distances are kept, so that latencies, losses and speeds can be swept over people.
+Only the smallest distances of every run are kept, so that latencies, losses and speeds can be swept over
+people.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,12 +26,12 @@ class Variant:
     ----------
     trial : Trial
     detector : str
-        `TRUE_KEYPOINTS`, or whose errors the keypoints have.
+        `TRUE_KEYPOINTS`, or the detector whose errors the keypoints have.
     latency : Latency
     lost_share : float
         Of the images, those in which nobody is found, beyond the detector's own losses.
     burst_images : float
-        How many in a row, on average.
+        Average number in a row.
     """
 
     trial: Trial
@@ -60,7 +61,7 @@ def variants(
     models : mapping of str to ErrorModel
         By detector.
     speeds_m_s, latencies_s, losses : sequence of float
-        What is swept.
+        Values of the sweeps.
 
     Returns
     -------
@@ -79,7 +80,7 @@ def variants(
 
 
 def least_distances(cycles: pd.DataFrame) -> dict[str, float]:
-    """How near the person came: `reach_m` until their first reach ended, `min_distance_m` until they left."""
+    """Smallest distances: `reach_m` until the first reach ended, `min_distance_m` until the person left."""
     distance_m, t_s = cycles["distance_m"], cycles["t_s"]
     return {"reach_m": float(distance_m[t_s <= NEAR_S].min()), "min_distance_m": float(distance_m.min())}
 
@@ -110,7 +111,7 @@ def _of_person(variants: Sequence[Variant], models: Mapping[str, ErrorModel]) ->
 
 
 def _run(variant: Variant, model: ErrorModel | None) -> dict:
-    trial = replace(variant.trial, duration_s=LEAVES_S[0])  # what comes after is not asked for
+    trial = replace(variant.trial, duration_s=LEAVES_S[0])  # the rest is not needed
     # The same errors and losses at every latency, as far as images are the same.
     drawn = partial(trial.subject.stream, trial.script)
     whole = modelled(model, drawn(variant.detector)) if model else true_keypoints

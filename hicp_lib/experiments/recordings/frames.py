@@ -1,4 +1,4 @@
-"""Frames of a simulated recording, and what makes them one: tables of truth and joints, settings, lists."""
+"""Frames of a simulated recording, and its further files: ground truth, joints, settings, lists."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -35,7 +35,7 @@ def record_frame(name: str, subject: Subject, k: int) -> tuple[np.ndarray, np.nd
     -------
     rgb : array, shape (480, 640, 3), dtype uint8
     depth_m, exact_m : array, shape (480, 640), dtype float32
-        As the depth camera measures it, and as it is.
+        As measured by the depth camera, and without errors.
     truth : dict of str to list
         `keypoints_m` (136, 3) in the base frame and `visible` (136,).
     """
@@ -50,7 +50,7 @@ def record_frame(name: str, subject: Subject, k: int) -> tuple[np.ndarray, np.nd
 
 
 def camera_at(plan: Scenario, k: int) -> PlacedCamera:
-    """The colour camera as frame `k` is taken."""
+    """The colour camera at frame `k`."""
     (T_root_camera,) = load_icub().T_root_camera(plan.head_rad(k + 1)[k:], plan.mount)
     return robot_camera(T_root_camera)
 
@@ -63,7 +63,7 @@ def camera_poses(plan: Scenario, n: int) -> np.ndarray:
 PARTS_DIR = ".frames"  # truth of finished frames, and what they were made with
 MOCAP_PART = "mocap.json"
 DEPTH_UNITS_PER_M = 1000.0
-START_S = 100.0  # what the camera's clock shows at the first frame: clocks seldom start together
+START_S = 100.0  # the camera's clock at the first frame: clocks rarely start together
 
 
 def files_of(out: Path, k: int) -> list[Path]:
@@ -73,7 +73,7 @@ def files_of(out: Path, k: int) -> list[Path]:
 
 
 def finish_recording(out: Path, plan: Scenario, n: int, stamp: dict) -> None:
-    """Write all but the frames of a recording.
+    """Write everything but the frames of a recording.
 
     Parameters
     ----------
@@ -81,9 +81,9 @@ def finish_recording(out: Path, plan: Scenario, n: int, stamp: dict) -> None:
         Its folder.
     plan : Scenario
     n : int
-        How many frames it has.
+        Number of frames.
     stamp : dict
-        What the frames were made with.
+        Settings of the frames.
     """
     times_s, T_base_cam = START_S + plan.times_s(n), camera_poses(plan, n)
     write_table(out / TRUTH_FILE, _truth(out, times_s, T_base_cam))

@@ -1,6 +1,8 @@
-"""What a person does before the robot, one gesture after another: reaches, points, crosses the arms, touches
-the table between them; and what takes parts of the body out of the image: raises the arms, steps half out of
-it or close, bends down, puts the hands behind the back.
+"""Random gestures of a person in front of the robot.
+
+Reaching, pointing, crossing the arms, touching the table between them; and gestures that take parts of the
+body out of the image: raising the arms, stepping half out of it or close, bending down, putting the hands
+behind the back.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -35,7 +37,7 @@ _N_TRIES = 12
 
 
 class Gestures:
-    """Draws what one person does next; every movement ends in a posture from which any other may follow.
+    """Samples a person's next gesture; every movement ends in a posture from which any other may follow.
 
     Parameters
     ----------
@@ -43,7 +45,7 @@ class Gestures:
     shape : str
         The person's.
     at_table : bool, optional
-        Whether there is a table before them, to be touched, or they can come near.
+        Whether there is a table in front of them to touch; if not, they can come near.
     """
 
     def __init__(self, rng: Rng, shape: str, at_table: bool = True):
@@ -59,7 +61,7 @@ class Gestures:
         return self._standing(sample_joints(self.rng, self.body, "standing", self.shape))
 
     def moves(self) -> Iterator[Move]:
-        """Movements without end, in rounds in which each kind of gesture comes once, in any order."""
+        """Endless movements, in rounds with each kind of gesture once, in random order."""
         kinds = ("reaching", "reaching_both", "hips", "crossed", "face", "pointing", "raised")
         gestures: list[Callable[[], Iterator[Move]]] = [partial(self._gesture, kind) for kind in kinds]
         gestures += [self._step, self._raise_high, self._behind_back]
@@ -70,14 +72,14 @@ class Gestures:
                 yield from gestures[k]()
 
     def _standing(self, joints: Joints) -> Posture:
-        """A posture with the arms and trunk of some joints, on this person's own legs and place."""
+        """A posture with given joints of arms and trunk, and this person's own legs and position."""
         return Posture({k: v for k, v in joints.items() if not k.endswith(_LEGS)} | self.legs, self.place_m)
 
     def _gesture(self, kind: str) -> Iterator[Move]:
         yield from self._go(self._free(lambda: sample_joints(self.rng, self.body, kind, self.shape)))
 
     def _free(self, draw: Callable[[], Joints]) -> Posture:
-        """The first posture drawn that the person can go to; at ease where there is none."""
+        """The first sampled posture that the person can reach; at ease if there is none."""
         for _ in range(_N_TRIES):
             posture = self._standing(draw())
             if self._is_free(posture):
@@ -124,7 +126,7 @@ class Gestures:
         return reduce(or_, drawn, self.at_ease().joints)
 
     def _behind_back(self) -> Iterator[Move]:
-        """Both hands behind the back, where the trunk hides them; around the trunk there and back."""
+        """Both hands behind the back, hidden by the trunk, moving around the trunk."""
         joints: Joints | None = self.at_ease().joints
         centre_m, half_m = self.collision_model.trunk_at(0.3)
         for side, outward in (("left", 1), ("right", -1)):
@@ -148,7 +150,7 @@ class Gestures:
         yield from self._walk(self.rng.uniform((-0.22, DISTANCE_M - 0.02), (0.22, DISTANCE_M + 0.2)))
 
     def _step_away(self, corners_m: tuple[tuple[float, float], tuple[float, float]]) -> Iterator[Move]:
-        """To a place in a rectangle on either side; something with the arms there; and back."""
+        """To a position in a rectangle on either side, an arm gesture there, and back."""
         home_m, side = np.array(self.place_m), self.rng.choice([-1, 1])
         yield from self._walk(self.rng.uniform(*corners_m) * (side, 1))
         yield from self._gesture(str(self.rng.choice(["hips", "crossed", "face"])))
@@ -171,13 +173,13 @@ class Gestures:
             yield Move(0.45, self.now)
 
     def _go(self, posture: Posture) -> Iterator[Move]:
-        """A movement as fast as people make it, then a pause."""
+        """A movement at human speed, then a pause."""
         self.now = posture
         yield Move(float(self.rng.uniform(0.7, 1.3)), posture)
         yield Move(float(self.rng.uniform(0.15, 0.7)), posture)
 
     def _is_free(self, posture: Posture) -> bool:
-        """Whether the person can go to a posture without running through themselves."""
+        """Whether the person can reach a posture without self-collision."""
         ways = (between(self.now, posture, share).joints for share in np.linspace(0.125, 1, 8))
         poses = map(pose_from_joints, ways)
         gaps_m = (self_collision_distance_m(self.body, self.collision_model, pose) for pose in poses)

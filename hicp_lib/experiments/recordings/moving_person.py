@@ -1,7 +1,7 @@
-"""A person who moves before the robot, watched by motion capture; the robot stands still.
+"""A person who moves in front of the robot, with motion capture; the robot stands still.
 
-The system has a clock and a world frame of its own: it starts before the camera does, and the camera's
-clock shows something else. What both truly are goes into `simulation.json`, for comparison only.
+The system has its own clock and world frame: it starts before the camera, whose clock differs. The true
+values of both are in `simulation.json`, for comparison only.
 """
 
 from dataclasses import dataclass, replace
@@ -25,9 +25,9 @@ from hicp_lib.simulation.sensors import markers
 from hicp_lib.simulation.sensors import motion_capture as mc
 
 HEAD_RAD = np.radians([0.0, 0.0, 0.0, 9.0, 0.0, 0.0])
-"""Where the robot holds its head: a little up, so that the person is seen from the thighs to the hair."""
+"""Pose of the robot's head: slightly up, so that the person is visible from the thighs to the hair."""
 
-_AT_TABLE = 0.5  # of the people; the others can step close
+_AT_TABLE = 0.5  # fraction of the people; the others can step close
 _LEAD_S = (0.3, 0.9)  # how long before the first frame motion capture starts; as long after the last it ends
 _BALL_M = 0.006  # radius of a marker
 
@@ -56,11 +56,11 @@ class MovingPerson:
         return _person(self, self.motion.still_since_s(time_s))
 
     def at(self, time_s: float) -> tuple[World, PosedBody]:
-        """All there is to see, and the person in it."""
+        """The scene, and the person in it."""
         return _staged(self, self.motion.still_since_s(time_s))
 
 
-# Whoever keeps still is posed and dressed once.
+# A still person is posed and dressed only once.
 @memoised(4)
 def _person(scene: MovingPerson, motion_s: float) -> PosedBody:
     return posed(scene.appearance.shape, scene.motion.at(motion_s))
@@ -74,7 +74,7 @@ def _staged(scene: MovingPerson, motion_s: float) -> tuple[World, PosedBody]:
 
 
 def _marker_balls(person: PosedBody, vertices: np.ndarray) -> Surface:
-    """The markers on a person as grey balls; each counts as the part of the body it is taped to."""
+    """The markers on a person as grey balls; each belongs to the body part to which it is attached."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, 7)
     profile_m = _BALL_M * np.c_[np.cos(angle), np.sin(angle)]
     balls = [g.lathe(profile_m, centre_m, 10) for centre_m in markers.markers_m(person, vertices)]
@@ -84,7 +84,7 @@ def _marker_balls(person: PosedBody, vertices: np.ndarray) -> Surface:
 
 @memoised(1)
 def moving_person(subject: Subject) -> MovingPerson:
-    """A subject's scene: who moves how, in what room. The same in every process."""
+    """A subject's scene: person, motion and room. The same in every process."""
     identity = subject.identity
     appearance, rng = appearance_of(identity, skirts=False), identity.draw("room", "table")
     top = table(rng, *TABLE_M, TABLE_HEIGHT_M) if rng.random() < _AT_TABLE else None
@@ -96,24 +96,24 @@ def moving_person(subject: Subject) -> MovingPerson:
 def capture(
     subject: Subject, duration_s: float, T_world_camera: np.ndarray
 ) -> tuple[MotionCapture, np.ndarray, float]:
-    """Motion capture of a subject who moves, from before the first frame on.
+    """Motion capture of a moving subject, starting before the first frame.
 
     Parameters
     ----------
     subject : Subject
-        Who it is; draws frame, clock and noise too.
+        The person; also determines frame, clock and noise.
     duration_s : float
         From the first frame to the last.
     T_world_camera : array, shape (4, 4)
-        The camera that carries a marker too; it stays where it is.
+        The camera, which has a marker too; it does not move.
 
     Returns
     -------
     exported : MotionCapture
-        What the system exports.
+        The exported measurements.
     T_mocap_world : array, shape (4, 4)
     lead_s : float
-        Its clock shows zero so long before the first frame.
+        Time from the zero of its clock to the first frame.
     """
     scene, rng = moving_person(subject), subject.stream("motion capture")
     T_mocap_world, lead_s = mc.mocap_frame(rng), float(rng.uniform(*_LEAD_S))

@@ -1,4 +1,4 @@
-"""The recordings the study's notebooks look at: a lab's own, or simulated once and kept in the cache."""
+"""The recordings for the notebooks: a lab's own, or simulated once and cached."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -20,18 +20,18 @@ def open_people(
     n_people: int = 1,
     seed: int = 0,
 ) -> list[Recording]:
-    """Open the recordings of an experiment, in each of which one person is seen.
+    """Open the recordings of an experiment, each with one person.
 
     Parameters
     ----------
     scenario : str
-        "relative-upper", "relative-lower" or "mocap"; simulated when no folder is given.
+        "relative-upper", "relative-lower" or "mocap"; simulated if no folder is given.
     recording : str or Path or sequence of str, optional
-        Folders of a lab's own recordings, one of each person.
+        Folders of a lab's own recordings, one per person.
     n_frames : int, optional
-        How many frames of each, from the first; all of them when left out.
+        Number of frames of each, from the first; by default all.
     n_people : int, optional
-        How many are simulated.
+        Number of simulated people.
     seed : int, optional
         Of the simulation: subject k of it is the k-th.
 
@@ -58,7 +58,7 @@ def open_people(
     people = [Subject(seed, number) for number in range(n_people)]
     names = [key([simulate_recording], **made, subject=who)[:16] for who in people]
     folder = cache_dir() / "recordings"
-    jobs = [  # a person to a process: who is there in what room is made once
+    jobs = [  # one person per process, so that person and room are made only once
         (f"{name}/{RGB_LIST}", partial(_simulate, name=name, **made, subject=who))
         for name, who in zip(names, people, strict=True)
         if not (folder / name / RGB_LIST).is_file()
@@ -74,7 +74,7 @@ def _simulate(folder: Path, name: str, scenario: str, n_frames: int, subject: Su
 
 
 def data_note(recordings: Mapping[str, Recording]) -> str:
-    """What recordings are, by their names, in the words of captions."""
+    """Description of recordings for captions, by their names."""
     plural = "s" if len(recordings) > 1 else ""
     told = [one for one in map(read_simulation, recordings.values()) if one]
     if len(told) < len(recordings):

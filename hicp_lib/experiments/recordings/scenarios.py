@@ -1,4 +1,4 @@
-"""The recordings that can be simulated: who is before the robot, and how either of them moves."""
+"""The recordings that can be simulated: the person in front of the robot, and the motion of both."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -22,8 +22,8 @@ from hicp_lib.simulation.sensors.time_of_flight import AZURE_KINECT
 
 POSES_FILE = DATA_DIR / "relative_poses.csv"
 DEPTH_CAMERAS = {"d435": D435, "azure-kinect": AZURE_KINECT}
-"""What a scenario may be recorded with, by name; nothing in this study is tuned on the second."""
-_POSES_APART = 8  # of the robot, from where one person's begin to where the next one's do
+"""Depth cameras by name; nothing in this study is tuned on the second."""
+_POSES_APART = 8  # offset between the first robot poses of consecutive people
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Scenario:
     head_rad : callable
         From the number of frames to joint angles of the robot, (n, 6), in the order of `HEAD_JOINTS`.
     stage : callable
-        From the subject and seconds from the first frame to what is to be seen, and the person in it.
+        From the subject and seconds from the first frame to the scene, and the person in it.
     capture : callable or None
         From the subject, the duration in seconds and T_world_camera to its motion capture, see `capture`.
     depth_camera : DepthCamera
@@ -68,7 +68,7 @@ def scenario(name: str, number: int = 0) -> Scenario:
     ----------
     name : str
     number : int, optional
-        Of the person: where in the list of the robot's poses theirs begin.
+        Of the person: determines the first of the robot's poses.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def _relative(view: str) -> Scenario:
     return Scenario(
         n_frames=len(poses_rad),
         max_frames=len(poses_rad),
-        rate_hz=0.5,  # the robot moves and settles between two frames
+        rate_hz=0.5,  # the robot moves and comes to rest between two frames
         mount=VIEWS[view],
         head_rad=lambda n: poses_rad[np.arange(n) % len(poses_rad)],
         stage=lambda subject, time_s: seated_person(subject),
@@ -120,7 +120,7 @@ SCENARIOS = {f"relative-{view}": _relative(view) for view in VIEWS} | {
     "mocap": Scenario(
         n_frames=48,
         max_frames=100_000,
-        rate_hz=5.0,  # frames further apart say more of a person, and the clock needs seconds
+        rate_hz=5.0,  # frames further apart show more of a person, and the clock offset needs seconds
         mount="level",
         head_rad=lambda n: np.tile(HEAD_RAD, (n, 1)),
         stage=lambda subject, time_s: moving_person(subject).at(time_s),

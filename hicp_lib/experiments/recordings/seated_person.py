@@ -1,6 +1,6 @@
-"""A person who sits still at a table before the robot, hands on it: what the stability test looks at.
+"""A person who sits still at a table in front of the robot, hands on it, for the stability test.
 
-The person sits at one place in one posture for the whole recording; only the robot moves.
+The person keeps one posture for the whole recording; only the robot moves.
 """
 
 import numpy as np
@@ -33,7 +33,7 @@ _N_ROUNDS = 6
 
 @memoised(1)
 def seated_person(subject: Subject) -> tuple[World, PosedBody]:
-    """A subject's scene: the person at the table in a furnished room. The same in every process."""
+    """A subject's scene: a person at a table in a furnished room. The same in every process."""
     identity = subject.identity
     body, appearance, rng = load_body(), appearance_of(identity, skirts=False), identity.draw("room", "table")
     person = _sit_down(body, appearance.shape, identity.draw("poses"))
@@ -69,7 +69,7 @@ def _sit_down(body: Body, shape: str, rng: np.random.Generator) -> PosedBody:
 def _with_arm(body: Body, shape: str, joints: Joints, side: str, wrist_m: np.ndarray) -> Joints:
     found = reach(body, shape, joints, side, wrist_m, elbow_toward=(-0.1, 0.8, -0.7))
     if found is None:
-        raise ValueError(f"the {side} hand cannot come to the table")
+        raise ValueError(f"the {side} hand cannot reach the table")
     return found
 
 

@@ -1,7 +1,7 @@
-"""Simulating recordings: what the robot's camera, its joints and motion capture would have recorded.
+"""Simulate recordings of the robot's camera, its joints and motion capture.
 
-Frame k depends on scenario, subject and k only, so the number of processes changes nothing, and a
-longer recording begins with the shorter one.
+Frame k depends on scenario, subject and k only, so the number of processes does not matter, and a longer
+recording starts with the shorter one.
 """
 
 from collections.abc import Callable
@@ -44,13 +44,13 @@ def simulate_recording(
     name : str
         "relative-upper", "relative-lower" or "mocap".
     n_frames : int, optional
-        The scenario's own number when left out.
+        By default the scenario's own number.
     subject : Subject, optional
-        Who is there, in what room, how they move, and all noise.
+        Determines person, room, motion and noise.
     workers : int or str, optional
         Processes, or the address of a Dask scheduler (`hicp_lib.core.executor.resolved`).
     progress : bool, optional
-        Whether a terminal is shown a bar.
+        Whether to show a bar on a terminal.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def simulate_recording(
 
 
 def record_one(out: Path, name: str, subject: Subject, k: int) -> None:
-    """Write the images of a frame, then its truth: a frame counts as finished when that is there.
+    """Write the images of a frame, then its ground truth, which marks the frame as finished.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def record_one(out: Path, name: str, subject: Subject, k: int) -> None:
 
 
 def _mocap_files(out: Path) -> list[Path]:
-    """What says that motion capture is finished, and the files of it."""
+    """The file that marks motion capture as finished, and its files."""
     c3d = Path(MOCAP_FILE).with_suffix(".c3d")
     return [out / frames.PARTS_DIR / frames.MOCAP_PART, out / MOCAP_FILE, out / c3d]
 

@@ -1,8 +1,9 @@
 """Predictions of other tools, from their own files to `Detections` by image id.
 
-`read_*` of each format gives people and the names of their images; here they meet the annotated images,
-scores come into [0, 1], and what belonged where is summed up. `hicp_lib.formats.annotations.write_detections`
-writes the detections with the tool's own scores and keys (`Imported.extras`) beside them.
+The `read_*` function of each format returns people and the names of their images; here they are matched with
+the annotated images, scores are scaled to [0, 1], and the matching is summarised.
+`hicp_lib.formats.annotations.write_detections` writes the detections with the tool's own scores and keys
+(`Imported.extras`) beside them.
 """
 
 from collections.abc import Callable
@@ -37,7 +38,7 @@ READERS: dict[str, Callable[[Path], People]] = {
 
 @dataclass(frozen=True)
 class Summary:
-    """What an import found, and what belonged to which image.
+    """What an import found, and how it matched the images.
 
     Attributes
     ----------
@@ -46,11 +47,11 @@ class Summary:
     n_images : int
         Annotated images.
     n_with_people, n_without_people : int
-        Images the files speak of, with somebody and with nobody.
+        Images that the files mention, with and without people.
     n_not_mentioned : int
-        Images the files say nothing of; nobody was found there, or the tool did not see them.
+        Images that the files do not mention: nobody was found there, or the tool did not process them.
     unmatched : tuple of str
-        Images of the files that are not annotated; their people are left out.
+        Images in the files that are not annotated; their people are left out.
     n_people : int
         People imported.
     conventions : dict of str to int
@@ -60,7 +61,7 @@ class Summary:
     score_scale : float
         What they were divided by.
     n_cut : int
-        How many of them were then cut to 1.
+        How many of them were then clipped to 1.
     n_keypoints, n_outside : int
         Keypoints given, and those outside their image.
     """
@@ -80,7 +81,7 @@ class Summary:
     n_outside: int
 
     def lines(self) -> list[str]:
-        """For people."""
+        """The summary as text lines."""
         low, middle, high = self.score_range
         scaled = f"divided by {self.score_scale:g}" if self.score_scale != 1 else "taken as they are"
         unmatched = ", ".join(map(repr, self.unmatched[:3])) + (", ..." if len(self.unmatched) > 3 else "")
@@ -97,18 +98,18 @@ class Summary:
 
 @dataclass(frozen=True)
 class Imported:
-    """Detections of every annotated image, and what the tool wrote beyond them.
+    """Detections of every annotated image, and the tool's further data.
 
     Attributes
     ----------
     detections : dict of int to Detections
-        By image id, in the order of the annotations; keypoint scores in [0, 1], divided by the scale and cut,
-        person scores the tool's own.
+        By image id, in the order of the annotations; keypoint scores in [0, 1], divided by the scale and
+        clipped; person scores as the tool wrote them.
     extras : dict of int to list of dict
         By image id, per person `raw_keypoint_scores` (136 in Halpe's order, 0 where not given) and the
         further keys of the tool's file, such as its box.
     summary : Summary
-        What belonged to which image.
+        How the predictions matched the images.
     """
 
     detections: dict[int, Detections]
@@ -130,7 +131,7 @@ def import_predictions(
     annotations : Annotations
         Of the images the tool ran on.
     scale : float, optional
-        What keypoint scores are divided by; the format's own when left out, see `scores`.
+        What keypoint scores are divided by; by default that of the format, see `scores`.
 
     Returns
     -------
@@ -139,7 +140,7 @@ def import_predictions(
     Raises
     ------
     InputError
-        For anything malformed, coordinates that are no pixels of these images, images that match none or
+        For anything malformed, coordinates that are not pixels of these images, images that match none or
         several; the message names the file, the entry, the key, what was expected and what to do.
     """
     refuse_unknown("format", format, READERS)
@@ -163,7 +164,7 @@ def import_predictions(
 def _refuse_other_scale(
     path: Path, points_px: np.ndarray, image_ids: np.ndarray, annotations: Annotations
 ) -> None:
-    """Refuse coordinates in images of another size: people end too soon or late, alike in both directions."""
+    """Refuse coordinates of images of another size: people too small or large, equally in both directions."""
     ends_px = pd.DataFrame(np.nan_to_num(points_px, nan=-np.inf).max(axis=1)).groupby(image_ids).max()
     boxes_px = annotations.boxes_px[:, :2] + annotations.boxes_px[:, 2:]
     ratios = ends_px / pd.DataFrame(boxes_px).groupby(annotations.image_ids).max()

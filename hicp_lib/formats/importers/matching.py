@@ -31,9 +31,9 @@ def match_images(
     path : Path
         Of the predictions, for messages.
     sources : sequence of str or int
-        What the predictions name images by, each once.
+        The images that the predictions name, each once.
     named_by : {"stem", "id", "number"}
-        What that is, as of `hicp_lib.formats.importers.people.People`.
+        How they are named, as in `hicp_lib.formats.importers.people.People`.
     images : dict of int to ImageInfo
         The annotated images, by id.
 
@@ -45,7 +45,7 @@ def match_images(
     Raises
     ------
     InputError
-        If no source has an image, or one could be several, or two are the same.
+        If no source has an image, one matches several, or two match the same.
     """
     tables = {key: _table(key, images) for key in (str, _name, _stem, _last_number)}
     matched = [_image_of(path, source, named_by, images, tables) for source in sources]
@@ -86,9 +86,9 @@ def _image_of(
     where: Path, source: str | int, named_by: NamedBy, images: Mapping[int, ImageInfo],
     tables: Mapping[Callable, _Table],
 ) -> int | None:  # fmt: skip
-    """The image that a source names, as `named_by` says."""
+    """The image that a source names, according to `named_by`."""
     if isinstance(source, int):
-        # Tools take the number from the file's name; where it is also the id of another image, ask.
+        # Tools take the number from the file's name; if it is also the id of another image, it is ambiguous.
         by_number = [] if named_by == "id" else tables[_last_number].get(source, [])
         candidates = sorted({*by_number, *([source] if source in images else [])})
     elif named_by == "stem":

@@ -1,11 +1,11 @@
 """MMPose's prediction folders: the inferencer's (`pred_out_dir`), and the demos' (`--save-predictions`).
 
-- The inferencer writes `<name>.json` for each image; the demos `results_<name>.json`, the same people as
-  `instance_info` beside `meta_info`, whose names of keypoints say which they are.
+- The inferencer writes `<name>.json` for each image; the demos `results_<name>.json`, with the people in
+  `instance_info` and the keypoint names in `meta_info`.
 - A file is a list of people: `keypoints` [[x, y], ...], `keypoint_scores`, and from top-down models `bbox`
   [[x1, y1, x2, y2]] (a list of one) and `bbox_score`.
 - Keypoint scores are the decoder's maxima: about 0 to 1 for heat maps, RTMPose and DWPose, up to about
-  10 for RTMW. A keypoint whose score is not positive has no place, its coordinates mean nothing.
+  10 for RTMW. A keypoint whose score is not positive is missing; its coordinates have no meaning.
 - The person's score is the one MMPose's own COCO evaluation uses: box score x mean of the keypoint
   scores above 0.2.
 
@@ -71,7 +71,7 @@ def read_mmpose(path: Path) -> People:
 
 
 def _instances(file: Path) -> tuple[list[dict], tuple[str, ...] | None]:
-    """Who is in a file, and of a demo's, the names of their keypoints if it has them."""
+    """The people in a file, and for a demo's file the names of their keypoints, if given."""
     data, names = read_json(file), None
     if isinstance(data, dict) and "instance_info" in data:
         meta = data.get("meta_info")
@@ -85,7 +85,7 @@ def _instances(file: Path) -> tuple[list[dict], tuple[str, ...] | None]:
 
 
 def _flat(rows: FileRows, i: int) -> list:
-    """One person's x, y, score of each keypoint in one list."""
+    """One person's x, y, score of each keypoint as a flat list."""
     points, scores = (rows.rows[i].get(key) for key in ("keypoints", "keypoint_scores"))
     if not isinstance(points, list) or not all(isinstance(xy, list) and len(xy) == 2 for xy in points):
         raise rows.error(i, f"keypoints is {shown(points)}; expected one [x, y] per keypoint")
@@ -95,7 +95,7 @@ def _flat(rows: FileRows, i: int) -> list:
 
 
 def _extras(rows: FileRows) -> list[dict]:
-    """What else is written, the box as COCO has it."""
+    """Further keys to keep, with the box in COCO's form."""
     extras = rows.extras(_KNOWN_KEYS)
     for i, box in ((i, row["bbox"]) for i, row in enumerate(rows.rows) if "bbox" in row):
         corners = box[0] if isinstance(box, list) and len(box) == 1 else box

@@ -1,15 +1,16 @@
-"""OpenPose's `--write_json` folders, and those of others in its style: a file for each image.
+"""OpenPose's `--write_json` folders, and those of other tools in its style: a file for each image.
 
-- A file is named `<name>_keypoints.json`, or where there is none such `<name>.json`.
-- The body has 25 parts (BODY_25) or 18 (COCO), told by the length of its list; face 70 and hands 21 each. In
-  OpenPose's style others write 17 (COCO), 26 or 136 (Halpe) and 133 (COCO-WholeBody), face and hands among
-  them. An empty list, or null, is a part of the model that was not run; one with confidence 0 was not found.
+- A file is named `<name>_keypoints.json`, or if there are none, `<name>.json`.
+- The body has 25 parts (BODY_25) or 18 (COCO), distinguished by the length of its list; the face has 70, each
+  hand 21. Other tools write 17 (COCO), 26 or 136 (Halpe) and 133 (COCO-WholeBody) in OpenPose's style,
+  including face and hands. An empty list, or null, means that this part of the model was not run; a keypoint
+  with confidence 0 was not found.
 - Coordinates are read as source pixels (`--keypoint_scale 0`, OpenPose's default) and refused otherwise.
-- OpenPose itself adds half a pixel to the body's peaks, not to those of face and hands; it is taken off,
-  which puts pixel centres at integers. Who writes a text as `version`, as AlphaPose does, is not OpenPose.
+- OpenPose itself adds half a pixel to the body's peaks, not to those of face and hands; it is subtracted, so
+  that pixel centres are at integers. A file with a text as `version`, as from AlphaPose, is not OpenPose's.
 - No score of the person is written (OpenPose's own averages parts and limbs, and limbs are not in the
   file). Here it is the sum of the body parts' confidences over the number of parts, absent ones 0;
-  where no body was run, the mean confidence of what was found.
+  without a body, the mean confidence of the keypoints found.
 
 Source: OpenPose's output documentation.
 """
@@ -77,7 +78,7 @@ def read_openpose(path: Path) -> People:
 
 
 def _people(file: Path) -> tuple[list[dict], bool]:
-    """Who is in a file, and whether OpenPose itself may have written it."""
+    """The people in a file, and whether OpenPose itself may have written it."""
     data = read_json(file)
     data = data or {"people": []} if isinstance(data, list) else data
     if not isinstance(data, dict) or "people" not in data:
@@ -117,7 +118,7 @@ def _lists(rows: FileRows, key: str, by_length: dict[int, str]) -> dict[int, lis
 
 
 def refuse_other_size(path: Path, keypoints_px: np.ndarray, sizes_px: np.ndarray) -> None:
-    """Refuse coordinates of the network's input or the output image; OpenPose finds nothing outside images.
+    """Refuse coordinates of the network's input or the output image: OpenPose finds no points outside images.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""People as another tool's files give them: in the Halpe-136 layout already, scores as written."""
+"""People from another tool's files: already in the Halpe-136 layout, with scores as written."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hicp_lib.formats.json_validation import Rows
 
 @dataclass(frozen=True)
 class People:
-    """Everybody in a tool's output, one row each, before anything is matched with images.
+    """All people in a tool's output, one row each, before they are matched with images.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class People:
         What `sources` are: "stem" (a file name without suffix), "id" (an image id, or a file name where it is
         text), "number" (as "id", but a number is the one at the end of a file name).
     sources : list of str or int
-        The images the files speak of, each once, also those without people.
+        The images that the files mention, each once, including those without people.
     source_of : array of int, shape (n,)
         Index into `sources`.
     keypoints_px : array, shape (n, 136, 2)
@@ -34,11 +34,11 @@ class People:
     raw_scores : array, shape (n, 136)
         The tool's own keypoint scores; 0 where not given.
     person_scores : array, shape (n,)
-        What people are ranked by.
+        The scores by which people are ranked.
     conventions : Counter of str
         How many people come in each convention, keys of `hicp_lib.core.keypoints.TO_HALPE`.
     extras : list of dict
-        Per person, what else the file says.
+        Per person, the further data in the file.
     """
 
     path: Path
@@ -102,14 +102,14 @@ class FileRows(Rows):
 
 
 def json_files(folder: Path, endings: tuple[str, ...], what: str) -> dict[str, Path]:
-    """Files of a folder by their name without the ending, in the order of names and of numbers in them.
+    """Files of a folder by their name without the ending, in natural order.
 
     Parameters
     ----------
     folder : Path
         Where they are.
     endings : tuple of str
-        How their names end; the first that any has.
+        Possible endings of their names; the first that any file has is used.
     what : str
         Which folder to give, for messages.
 
@@ -120,7 +120,7 @@ def json_files(folder: Path, endings: tuple[str, ...], what: str) -> dict[str, P
     Raises
     ------
     InputError
-        If it is no folder, or holds no such file.
+        If it is not a folder, or contains no such file.
     """
     names = [name for name in listed(folder, what=what) if name[0] != "_"]
     for ending in endings:

@@ -1,19 +1,19 @@
 """Lists of COCO keypoint results, as COCO, Detectron2, AlphaPose and OpenPose write them.
 
-All have `image_id, category_id, keypoints, score`; what each tool does its own way is a `Dialect`:
+All have `image_id, category_id, keypoints, score`; the differences between tools are a `Dialect`:
 
-- COCO: the third number of a keypoint is anything; a keypoint 0, 0, 0 is not given. Tables that `hicp detect`
-  writes, and data sets that `hicp export` writes, are read too. Where every row has a `file_name`, that is
-  the image's name, not the id.
-- Detectron2's `coco_instances_results.json`: it takes half a pixel off its continuous coordinates on
-  writing, which puts pixel centres at integers as everywhere here, so nothing is added on reading.
-  Keypoint scores are the softmax mass of the best cell of a 56 x 56 grid: small numbers, 0.05 is a lot.
-- AlphaPose's `alphapose-results.json`: `image_id` is a file name, or with `--eval` the number at its
-  end. All keypoints are always there. The person's score is mean + box + 1.25 max, about 0.5 to 3.
-  Keypoint scores of its regression models run far below those of its heat maps (0.05 against 0.4 is
-  where its own drawings begin).
+- COCO: the third number of a keypoint has no fixed meaning; a keypoint 0, 0, 0 is missing. Tables that `hicp
+  detect` writes, and data sets that `hicp export` writes, are read too. Where every row has a `file_name`,
+  that is the image's name, not the id.
+- Detectron2's `coco_instances_results.json`: it subtracts half a pixel from its continuous coordinates when
+  writing, which puts pixel centres at integers as everywhere here, so nothing is added on reading. Keypoint
+  scores are the softmax mass of the best cell of a 56 x 56 grid: small numbers, of which 0.05 is high.
+- AlphaPose's `alphapose-results.json`: `image_id` is a file name, or with `--eval` the number at its end. All
+  keypoints are always there. The person's score is mean + box + 1.25 max, about 0.5 to 3. Keypoint scores of
+  its regression models are far below those of its heat maps (its own drawings use thresholds of 0.05 and
+  0.4).
 - OpenPose's `--write_coco_json`: the body's 17, found (1) or not (0), and the number in the file name.
-  They are half a pixel above pixel centres at integers, which is taken off.
+  They exceed pixel centres at integers by half a pixel, which is subtracted.
 
 Sources: the COCO results format, and the writers of Detectron2 (`coco_evaluation.py`), AlphaPose
 (`pPose_nms.py`) and OpenPose (`cocoJsonSaver.cpp`).
@@ -36,7 +36,7 @@ _KNOWN_KEYS = {"image_id", "file_name", "category_id", "keypoints", "score", *PA
 
 @dataclass(frozen=True)
 class Dialect:
-    """What a tool does its own way.
+    """The conventions of one tool.
 
     Attributes
     ----------
@@ -45,13 +45,13 @@ class Dialect:
     file_name : str
         Looked for when a folder is given.
     named_by : {"id", "number"}
-        What a number as `image_id` is, see `People`.
+        What a number in `image_id` means, see `People`.
     absent : {"zeros", "score"}
         A keypoint is not given when all three numbers are 0, or when its score is not positive.
     categories : tuple of int
         Ids that mean a person.
     offset_px : float
-        What its coordinates exceed those with pixel centres at integers by.
+        By how much its coordinates exceed those with pixel centres at integers.
     """
 
     tool: str
@@ -70,14 +70,14 @@ OPENPOSE = Dialect("OpenPose", "coco.json", named_by="number", offset_px=0.5)
 
 
 def read_results(path: Path, dialect: Dialect) -> People:
-    """Read a list of COCO keypoint results, or the one of the tool's own name in a folder.
+    """Read a list of COCO keypoint results, or in a folder the file with the tool's usual name.
 
     Parameters
     ----------
     path : Path
-        The file, or a folder with a file of the tool's name.
+        The file, or a folder with a file of the tool's usual name.
     dialect : Dialect
-        The tool's way.
+        The tool's conventions.
 
     Returns
     -------
@@ -114,7 +114,7 @@ def _checked_list(path: Path, value: Any, dialect: Dialect) -> list:
 
 
 def _exported(rows: Any) -> list[dict]:
-    """Results out of a data set that `hicp export` wrote, its flags replaced by its scores; else none."""
+    """Results from a data set that `hicp export` wrote, its flags replaced by its scores; else None."""
     try:
         triples = [np.reshape(row["keypoints"], (-1, 3)).copy() for row in rows]
         for row, of in zip(rows, triples, strict=True):

@@ -1,12 +1,13 @@
-"""Keypoint scores of other tools brought into [0, 1], in order.
+"""Keypoint scores of other tools scaled to [0, 1], keeping their order.
 
-A score is divided by its format's scale and cut to [0, 1], where order is kept, though what was cut becomes
-equal; the tool's own score stays beside it. This makes ranges equal, not meanings: 0.3 of one tool is still
-not 0.3 of another.
+A score is divided by its format's scale and clipped to [0, 1]; the order is kept, except that clipped scores
+become equal. The tool's own score is stored too. This makes ranges equal, not meanings: 0.3 from one tool is
+still not 0.3 from another.
 
-A detector has one scale, whatever the highest score in a folder is: 1, or where scores pass that it is asked
-for. OpenPose's confidences lie in [0, 1]; AlphaPose's heat-map maxima and Detectron2's softmax mass can pass
-1 by a little. MMPose's can be those of RTMW, which reach about 10, and so can plain COCO results.
+A detector has one scale, independent of the highest score in a folder: 1, or if scores exceed it, the user
+has to give the scale. OpenPose's confidences lie in [0, 1]; AlphaPose's heat-map maxima and Detectron2's
+softmax mass can exceed 1 slightly. MMPose's can be those of RTMW, which reach about 10, and so can plain COCO
+results.
 """
 
 from hicp_lib.core.errors import InputError
@@ -18,14 +19,14 @@ _A_LITTLE_MORE = 2.0  # than 1
 
 
 def score_scale(format: str, people: People) -> float:
-    """What keypoint scores of this format are divided by.
+    """The number by which keypoint scores of this format are divided.
 
     Parameters
     ----------
     format : str
         The tool's.
     people : People
-        All that it found.
+        All people that it found.
 
     Returns
     -------
@@ -34,7 +35,7 @@ def score_scale(format: str, people: People) -> float:
     Raises
     ------
     InputError
-        If they pass 1, and another scale may be meant.
+        If they exceed 1, so that the scale is ambiguous.
     """
     highest = people.raw_scores.max(initial=0.0)
     if highest <= (1.0 if format in _WITH_RTMW else _A_LITTLE_MORE):

@@ -1,8 +1,8 @@
 """Clothes: parts of the body's surface, cut along smooth fields, inflated, smoothed and folded.
 
-A garment's cut does not depend on the person's shape or pose, so it is made once and kept.
-On a posed body, the cut's vertices are smoothed as cloth bridges hollows, kept at least its
-thickness away from the skin, and folded.
+A garment's cut does not depend on the person's shape or pose, so it is made once and kept. On a posed body,
+the cut's vertices are smoothed, as cloth bridges hollows, kept away from the skin by at least its thickness,
+and folded.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Garment:
     kind : str
         "top" or "bottom".
     start, end : float
-        Where it begins and ends. Top: height of hem and collar in the body's `torso` field.
+        Where it starts and ends. Top: height of hem and collar in the body's `torso` field.
         Bottom: end in the `leg` field and waist in the `torso` field.
     sleeve : float
         End of the sleeves in the `arm` field.
@@ -51,13 +51,13 @@ class Garment:
 
 @dataclass(frozen=True)
 class Pattern:
-    """A garment cut out, ready to be put on; it has n vertices.
+    """A cut-out garment with n vertices, ready to be put on.
 
     Attributes
     ----------
     cut : g.Cut
     smoothing : array, shape (n, n)
-        Moves each vertex most of the way to the middle of its neighbours.
+        Moves each vertex most of the way to the mean of its neighbours.
     distance : array, shape (n,)
         How far inside the garment's edge each vertex is, in its field's units.
     rim : array of int, shape (n_edges, 2)
@@ -75,7 +75,7 @@ class Pattern:
 
 def cut_pattern(garment: Garment) -> Pattern:
     """Cut a garment out of the body's surface."""
-    # What it is made of does not change the cut.
+    # The material does not change the cut.
     return _cut_pattern(garment.kind, garment.start, garment.end, garment.sleeve, garment.opening)
 
 
@@ -130,7 +130,7 @@ def put_on(
     folds : array, shape (n_waves, 5)
         Wave vector in rest coordinates (rad/m), phase, height (m).
     layers_m : array, shape (n_v,)
-        How far from the skin the clothes worn below reach; updated in place.
+        Distance from the skin of the clothes worn below; updated in place.
 
     Returns
     -------
@@ -206,7 +206,7 @@ def collar(garment: Garment, mesh: g.Mesh, posed: PosedBody, rise_m: float, open
     mesh : g.Mesh
         The garment as `put_on` returns it.
     posed : PosedBody
-        Who wears it.
+        The person wearing it.
     rise_m : float
         How high it stands.
     open_m : float
@@ -293,7 +293,7 @@ def skirt(posed: PosedBody, hip_rotation: np.ndarray, length_m: float, flare: fl
 
 
 def random_folds(rng: np.random.Generator, height_m: float, n_waves: int = 8) -> np.ndarray:
-    """Waves for `put_on`: mostly upright folds, some slanting.
+    """Waves for `put_on`: mostly vertical folds, some oblique.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from hicp_lib.simulation.rendering import textures
 from hicp_lib.simulation.rendering.surfaces import Look, Material, column
 
 Panels = tuple[np.ndarray, np.ndarray]
-"""How a person's garments are laid out flat, at rest in the body frame: origins in metres, (5, 3), and
+"""Flat panels of a person's garments, at rest in the body frame: origins in metres, (5, 3), and
 axis, front and side of each panel, (5, 3, 3), unit vectors at right angles to each other. 0 is the trunk,
 then come left arm, right arm, left leg and right leg; coordinates run along the axis and around it, from
 the front."""
@@ -33,7 +33,7 @@ def make_panels(landmarks_m: np.ndarray) -> Panels:
 
 
 def panel_coordinates(panels: Panels, coords: np.ndarray, limbs: str) -> tuple[np.ndarray, np.ndarray]:
-    """Where on which panel places of a garment lie.
+    """Panels and panel coordinates of points on a garment.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def random_fabric(rng: Rng, plain: float) -> Fabric:
     )
 
 
-# How often a pattern is worn, between what its period lies (m), which texture it is and of what numbers.
+# Frequency of a pattern, range of its period (m), its texture and the texture's parameters.
 _PATTERNS = PEOPLE["patterns"]
 
 
@@ -229,7 +229,7 @@ def _sew(trim: Trim, distance, rest, panel, height, albedo) -> tuple[np.ndarray,
     """Heights (n,) and albedo (3, n) with hems and a line in front."""
     band = distance < trim.hem
     seam = np.abs(distance - trim.hem) < 0.006
-    one = np.float32(1)  # with Python's numbers alone, np.where would compute in double precision
+    one = np.float32(1)  # with plain Python numbers, np.where would compute in double precision
     albedo = albedo * (np.where(band, np.float32(trim.band), one) * np.where(seam, np.float32(0.8), one))
     height = height * np.where(band, np.float32(0.4), one) + np.float32(0.0006) * band
     if trim.line == "none":

@@ -21,14 +21,14 @@ Rng = np.random.Generator
 
 @dataclass(frozen=True)
 class Obstacles:
-    """What hair lies on, at rest, body frame.
+    """Surfaces that hair lies on, at rest, body frame.
 
     Attributes
     ----------
     centre_m : array, shape (3,)
         Middle of the head.
     radius_m : array, shape (36, 72)
-        Of head and neck by direction from there: rows of rising, columns of turning direction.
+        Of head and neck by direction from there: rows of elevation, columns of azimuth.
     corner_m : array, shape (2,)
         Where the trunk's grid over y and z begins; its cells are `_CELL_M` wide.
     back_m, front_m : array, shape (rows, columns)
@@ -75,7 +75,7 @@ def _radii(offset: np.ndarray) -> np.ndarray:
     radius = np.zeros(_GRID)
     cells = np.clip(row, 0, _GRID[0] - 1), column % _GRID[1]
     np.maximum.at(radius, cells, np.linalg.norm(offset, axis=1))
-    while not radius.all():  # directions no vertex lies in take their neighbours'
+    while not radius.all():  # directions without a vertex take their neighbours' values
         padded = np.pad(radius, ((1, 1), (0, 0)), mode="edge")
         around = [np.roll(radius, s, axis=1) for s in (-1, 1)] + [padded[2:], padded[:-2]]
         radius = np.where(radius == 0, np.max(around, axis=0), radius)
@@ -115,7 +115,7 @@ def _radius(head: Obstacles, offset: np.ndarray) -> np.ndarray:
 
 
 def _keep_off(head: Obstacles, points: np.ndarray, layer: np.ndarray) -> np.ndarray:
-    """Push points out of the head, away from its middle, and out of the trunk, to its front or back."""
+    """Push points out of the head, away from its centre, and out of the trunk, to its front or back."""
     offset = points - head.centre_m
     distance = np.linalg.norm(offset, axis=1)
     wanted = _radius(head, offset) + layer
@@ -297,7 +297,7 @@ def _ribbons(style: Style, head: Obstacles, points: np.ndarray, length: np.ndarr
 def carry(
     hair: g.Mesh, body: Body, posed: PosedBody, rest_heads_m: np.ndarray, landmarks_m: np.ndarray
 ) -> g.Mesh:
-    """Hair at rest brought to the pose: by the head, and from the chin down more and more by the back.
+    """Hair at rest moved to the pose: by the head, and below the chin increasingly by the back.
 
     Parameters
     ----------

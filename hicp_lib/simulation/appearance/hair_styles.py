@@ -50,7 +50,7 @@ class Style:
     coil_m: float = 0.0
 
 
-_MOST_CURL = 0.10  # of what is drawn
+_MOST_CURL = 0.10  # of the sampled lengths
 
 
 def random_style(rng: Rng, woman: bool, age: float) -> Style | None:

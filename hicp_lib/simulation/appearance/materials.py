@@ -1,4 +1,4 @@
-"""Looks of lifeless things: paint, wood, floors, cloth on furniture, the view from a window."""
+"""Materials of objects: paint, wood, floors, cloth on furniture, the view from a window."""
 
 import colorsys
 
@@ -38,7 +38,7 @@ def hsv(hue: float, saturation: float, value: float) -> np.ndarray:
 
 
 def any_colour(rng: Rng) -> np.ndarray:
-    """A colour things are made in: mostly muted, sometimes strong, linear RGB."""
+    """A typical colour of objects: mostly muted, sometimes strong, linear RGB."""
     if rng.random() < 0.25:
         return linear(np.full(3, rng.choice([0.1, 0.2, 0.5, 0.75, 0.9])))
     return hsv(rng.random(), rng.beta(2, 2.2), rng.uniform(0.2, 0.9))
@@ -64,7 +64,7 @@ def plain(colour: np.ndarray, roughness: float = 0.5, gloss: float = 0.04, glow:
     roughness, gloss : float, optional
         See `surfaces.Look`.
     glow : float, optional
-        Light given off, as a share of the colour.
+        Emitted light, as a fraction of the colour.
 
     Returns
     -------

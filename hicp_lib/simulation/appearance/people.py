@@ -17,7 +17,7 @@ RIGHT = len(REGIONS)
 
 @dataclass(frozen=True)
 class Worn:
-    """A garment as it is worn.
+    """A garment with its fabric and details.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ Skirt = tuple[float, float, float, fabrics.Fabric]
 
 @dataclass(frozen=True, eq=False)
 class Appearance:
-    """One person, whatever the pose: shape, colours, hair, clothes.
+    """A person's appearance in any pose: shape, colours, hair, clothes.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Appearance:
 
 
 def appearance_of(identity: Identity, skirts: bool = True) -> Appearance:
-    """A person's shape, skin, hair and clothes that could go together.
+    """A plausible combination of shape, skin, hair and clothes.
 
     Parameters
     ----------
@@ -153,16 +153,16 @@ def part_of_vertices(body: Body) -> np.ndarray:
 
 @memoised(64)
 def _measured(shape: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, fabrics.Panels, hair.Obstacles]:
-    """Of a shape at rest: vertices, bone heads, keypoints, where cloth is laid out, what hair lies on."""
+    """Of a shape at rest: vertices, bone heads, keypoints, panels of cloth, surfaces below hair."""
     body = load_body()
     rest, heads = rest_shape(body, shape)
     landmarks = body.keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
     return rest, heads, landmarks, fabrics.make_panels(landmarks), hair.obstacles(body, rest, landmarks)
 
 
-@memoised(4)  # those who are seen in many frames
+@memoised(4)  # for people who are seen in many frames
 def _fit(appearance: Appearance) -> tuple[np.ndarray, g.Mesh | None]:
-    """What stays the same of a person in all poses: paint, and hair at rest."""
+    """What is the same for a person in all poses: paint, and hair at rest."""
     body = load_body()
     rest, _, landmarks, _, head = _measured(appearance.shape)
     paint, rng = skin.paint_coords(body, rest, landmarks), np.random.default_rng(appearance.seed)
@@ -190,12 +190,12 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
     posed : PosedBody
         Of the appearance's shape.
     person : int
-        Whose surfaces they are.
+        Index of the person.
 
     Returns
     -------
     list of Surface
-        In the frame the person is posed in.
+        In the frame of the posed person.
     """
     body, (paint, grown) = load_body(), _fit(appearance)
     rest, heads, landmarks, panels, _ = _measured(appearance.shape)

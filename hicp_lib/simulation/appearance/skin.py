@@ -89,13 +89,13 @@ def _hair_colour(rng: np.random.Generator, dark: bool, age: float) -> np.ndarray
     return hsv(hue + rng.normal(0, 0.008), saturation * rng.uniform(0.8, 1.15), value)
 
 
-# What `paint_coords` puts beside the rest position.
+# Columns of `paint_coords` after the rest position.
 _PAINTED = ("hairline_m", "brow_m", "lash_m", "beard_m", "iris_rad", "lips", "eyelid", "nail")
 COORDS = ("x", "y", "z", *_PAINTED, "eye", "mouth", "flush")
 
 
 def paint_coords(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.ndarray:
-    """What skin is painted by, per vertex.
+    """Coordinates per vertex for painting the skin.
 
     Parameters
     ----------

@@ -1,8 +1,7 @@
-"""Where the arms go: each function takes joints with both arms hanging and places the arms.
+"""Poses of the arms: each function takes joints with both arms hanging and poses the arms.
 
 All take a `Draft` and the joint angles of the whole body (radians, by joint), and return the angles
-with those of the arms changed. They return None where the limits of the joints do not allow what was drawn;
-draw again.
+with those of the arms changed. They return None if the sampled pose violates joint limits; then sample again.
 """
 
 from dataclasses import dataclass
@@ -22,21 +21,21 @@ Ranges = dict[str, Range]
 _OTHER = {"left": "right", "right": "left"}
 _OUTWARD = {"left": 1, "right": -1}  # along y, which points to the person's left
 
-_WRISTS_DEG = PEOPLE["wrists_deg"]  # what comes first is drawn first
+_WRISTS_DEG = PEOPLE["wrists_deg"]  # the order of sampling
 
 
 @dataclass(frozen=True)
 class Draft:
-    """What drawing a pose needs to know.
+    """Inputs for sampling a pose.
 
     Attributes
     ----------
     rng : numpy.random.Generator
     body : Body
     model : CollisionModel
-        Sizes of the shape that is posed.
+        Sizes of the posed shape.
     room_m : float
-        How much room to give the arms.
+        Minimum distance of the arms from the body.
     """
 
     rng: Rng
@@ -46,7 +45,7 @@ class Draft:
 
 
 def uniform(rng: Rng, ranges: Ranges, prefix: str = "") -> Joints:
-    """Joint angles drawn evenly from ranges.
+    """Joint angles sampled uniformly from ranges.
 
     Parameters
     ----------
@@ -54,7 +53,7 @@ def uniform(rng: Rng, ranges: Ranges, prefix: str = "") -> Joints:
     ranges : dict of str to tuple of float
         Degrees, by joint.
     prefix : str, optional
-        Goes before the joints' names.
+        Prefix of the joints' names.
 
     Returns
     -------
@@ -67,7 +66,7 @@ def uniform(rng: Rng, ranges: Ranges, prefix: str = "") -> Joints:
 def hanging_arm(draft: Draft, side: str) -> Joints:
     """One arm hanging at ease."""
     joints = uniform(draft.rng, PEOPLE["poses_deg"]["hanging"], f"{side}_")
-    # An arm half a metre long: this angle moves its middle away by the room.
+    # For an arm of half a metre, this angle moves its middle away by `room_m`.
     joints[f"{side}_shoulder_abduction"] += draft.room_m / 0.25
     return joints
 
@@ -179,7 +178,7 @@ def in_lap(draft: Draft, joints: Joints) -> Joints | None:
 
 
 def of_any_kind(draft: Draft, joints: Joints) -> Joints | None:
-    """What a sitting person does with the arms: one of the above."""
+    """Any of the above, for a sitting person."""
     kinds = (in_lap, in_lap, one_reaching, both_reaching, crossed, near_face)
     return kinds[draft.rng.integers(len(kinds))](draft, joints)
 
@@ -187,7 +186,7 @@ def of_any_kind(draft: Draft, joints: Joints) -> Joints | None:
 def _bring(
     draft: Draft, joints: Joints | None, side: str, wrist_m: np.ndarray, elbow_toward, wrist: str
 ) -> Joints | None:
-    """Bring a wrist to a point, the joints beyond the elbow drawn as in `_WRISTS_DEG`; None stays None."""
+    """Move a wrist to a point, sampling the joints beyond the elbow from `_WRISTS_DEG`; None stays None."""
     if joints is None:
         return None
     joints = joints | uniform(draft.rng, _WRISTS_DEG[wrist], f"{side}_")
@@ -199,7 +198,7 @@ def _side(rng: Rng) -> str:
 
 
 def _heads(draft: Draft, joints: Joints, side: str) -> dict[str, np.ndarray]:
-    """Where the bones of a side and of the middle begin, from the pelvis."""
+    """Start points of the bones of a side and of the middle, relative to the pelvis."""
     _, heads = pose_bones(draft.body, draft.model.shape, pose_from_joints(joints))
     end = "." + side[0].upper()
     return {name.removesuffix(end): heads[i] for i, name in enumerate(draft.body.bone_names)}

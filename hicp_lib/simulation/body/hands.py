@@ -20,7 +20,7 @@ def sample_hand(rng: np.random.Generator, kind: str, prefix: str = "") -> Joints
     kind : str
         One of `HANDS_DEG`.
     prefix : str, optional
-        Goes before the names of the joints, such as `left_`.
+        Prefix of the joints' names, such as `left_`.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""Who is simulated and what is drawn around them, in two splits that share nothing.
+"""Identities and everything sampled with them, in two disjoint splits.
 
-What is tuned, measured or chosen is tuned on *development* identities; what is reported is measured on people
-*held out*. `data/identities.json` deals the shapes of the body model, and the numbers that clothes (with skin
-and hair), rooms, lights, poses and cameras are drawn from; each number seeds a generator of its own.
+Methods are tuned on *development* identities; the report evaluates on *held-out* ones. `data/identities.json`
+assigns to each split the shapes of the body model, and the seeds from which clothes (with skin and hair),
+rooms, lights, poses and cameras are sampled.
 """
 
 from collections.abc import Mapping
@@ -24,13 +24,13 @@ SPLITS = ("development", "held out")
 HELD_OUT = SPLITS[1]
 KINDS = ("clothes", "room", "lights", "poses", "camera")
 PEOPLE = read_json(DATA_DIR / "people.json")
-"""What people can do and how they look: joints, poses, hands, hair, clothes, skin; see data/README.md."""
+"""Distributions of joints, poses, hands, hair, clothes and skin; see data/README.md."""
 _read = memoised()(read_json)
 
 
 @dataclass(frozen=True)
 class Identity:
-    """One person and all that is drawn around them.
+    """One person and the seeds of everything around them.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Identity:
     body : str
         Name of a shape of the body model.
     clothes, room, lights, poses, camera : int
-        What each is drawn from.
+        The seed of each.
     """
 
     split: str
@@ -51,22 +51,23 @@ class Identity:
     camera: int
 
     def draw(self, kind: str, *more: int | str) -> np.random.Generator:
-        """A generator of one of `KINDS`, from its beginning; `more` make it one of its own, see `stream`."""
+        """A new generator for one of `KINDS`; with `more`, an independent one, see `stream`."""
         return stream(kind, getattr(self, kind), *more)
 
 
 @dataclass(frozen=True)
 class Subject:
-    """One person of an experiment, and all that is drawn around them.
+    """One person of an experiment, with everything sampled around them.
 
-    Subjects of one seed are different people: bodies are dealt without repetition, women and men in turn.
+    Subjects of one seed are different people: bodies are assigned without repetition, alternating women and
+    men.
 
     Attributes
     ----------
     seed : int
         Of the experiment.
     number : int
-        Of the person, from 0 to less than there are bodies.
+        Of the person, from 0, below the number of bodies.
     split : str
         One of `SPLITS`.
 
@@ -94,21 +95,21 @@ class Subject:
 
     @cached_property
     def identity(self) -> Identity:
-        """Who it is; the same in every process."""
+        """The subject's identity; the same in every process."""
         return draw_identity(self.stream("identity"), self.split, _dealt(self.split, self.seed)[self.number])
 
     def stream(self, *numbers: int | str) -> np.random.Generator:
-        """A generator of noise or whatever else belongs to this subject alone, see `stream`."""
+        """A generator for noise and the like of this subject only, see `stream`."""
         return stream(self.split, self.seed, self.number, *numbers)
 
 
 def stream(*numbers: int | str) -> np.random.Generator:
-    """A generator of random numbers; what one stream draws says nothing about what another draws.
+    """A generator of random numbers, independent of other streams.
 
     Parameters
     ----------
     *numbers : int or str
-        Non-negative; a name counts as its letters' numbers.
+        Non-negative; a name counts as the codes of its letters.
 
     Examples
     --------
@@ -128,7 +129,7 @@ def draw_identity(rng: np.random.Generator, split: str, body: str | None = None)
     split : str
         One of `SPLITS`.
     body : str, optional
-        Name of the shape; drawn too when left out.
+        Name of the shape; sampled by default.
 
     Returns
     -------
@@ -146,7 +147,7 @@ def draw_identity(rng: np.random.Generator, split: str, body: str | None = None)
 
 
 def split_members(split: str) -> Mapping[str, Any]:
-    """What belongs to a split: names of its `bodies`, and for each of `KINDS` the least and greatest number.
+    """Members of a split: names of its `bodies`, and for each of `KINDS` the smallest and largest seed.
 
     Raises
     ------
@@ -159,7 +160,7 @@ def split_members(split: str) -> Mapping[str, Any]:
 
 
 def traits(name: str) -> Mapping[str, Any]:
-    """What a shape was made from, see data/body.json."""
+    """Parameters of a shape, see data/body.json."""
     return _read(DATA_DIR / "body.json")["shapes"][name]
 
 
@@ -170,7 +171,7 @@ def is_woman(name: str) -> bool:
 
 @memoised(16)
 def _dealt(split: str, seed: int) -> list[str]:
-    """A split's shapes in random order, women and men in turn as long as there are both."""
+    """A split's shapes in random order, alternating women and men as long as there are both."""
     mixed = [str(name) for name in stream(split, seed, "bodies").permutation(split_members(split)["bodies"])]
     women, men = ([name for name in mixed if is_woman(name) == woman] for woman in (True, False))
     turns = [women, men] if is_woman(mixed[0]) else [men, women]

@@ -1,4 +1,4 @@
-"""Joint angles of anatomy and the rotations of bones they stand for.
+"""Anatomical joint angles and the corresponding rotations of bones.
 
 A `Joints` maps joint names to radians, all zero in the body model's reference stance (see
 `body`): standing at attention, arms hanging, palms to the thighs. Joints of a limb are named
@@ -31,9 +31,9 @@ LIMITS_DEG: dict[str, tuple[float, float]] = PEOPLE["trunk_joints_deg"] | {
 Surgeons (Joint Motion: Method of Measuring and Recording, 1965), where it gives one; thumb, finger
 spread and eyes are estimates."""
 
-# How a movement of several bones is shared among them, from the first to the last.
+# How a movement is distributed over several bones, from the first to the last.
 _SHARES = PEOPLE["movement_shares"]
-# The shoulder girdle goes along with an arm that is raised beyond this.
+# The shoulder girdle moves with an arm raised beyond this.
 _GIRDLE_FROM_RAD = np.radians(25.0)
 # Left limbs in the reference stance: tilt and direction of the arm, and the hinge the thumb bends about.
 ARM_TILT_RAD = np.radians(9.0)
@@ -98,7 +98,7 @@ def pose_from_joints(angles: Joints) -> Pose:
     return pose
 
 
-@memoised(256)  # while a pose is sought, most limbs stay as they are
+@memoised(256)  # during the search for a pose, most limbs do not change
 def _limb(name: str, side: str, angles: tuple[float, ...]) -> dict[str, np.ndarray]:
     """Rotations of a limb's bones by the angles of its joints, in the order of `_LIMBS`."""
     turns = _BONES[name](dict(zip(_LIMBS[name], angles, strict=True)))
@@ -147,7 +147,7 @@ def _trunk(angles: Joints) -> dict[str, np.ndarray]:
 
 
 def _arm(limb: dict[str, float]) -> dict[str, np.ndarray]:
-    """A left arm. Turns about its own axis are spread along it, so that the skin twists evenly."""
+    """A left arm. Rotation about its own axis is distributed along it, so that the skin twists evenly."""
     turn = limb["shoulder_rotation"] * HANGING
     swing = shoulder_rotation(limb["shoulder_flexion"], limb["shoulder_abduction"], 0.0)
     girdle, upper = _with_girdle(swing)
@@ -163,7 +163,7 @@ def _arm(limb: dict[str, float]) -> dict[str, np.ndarray]:
 
 
 def _with_girdle(swing: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Part of an arm's swing done by collar bone and shoulder blade, and what is left for the arm."""
+    """Split an arm's swing into the part of collar bone and shoulder blade, and the rest for the arm."""
     axis = np.array([swing[2, 1] - swing[1, 2], swing[0, 2] - swing[2, 0], swing[1, 0] - swing[0, 1]])
     length = np.linalg.norm(axis)
     angle = np.arctan2(length, np.trace(swing) - 1)
@@ -171,7 +171,7 @@ def _with_girdle(swing: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
         return {}, swing
     beyond = axis / length * (angle - _GIRDLE_FROM_RAD)
     girdle = {bone: share * beyond for bone, share in _SHARES["girdle"].items()}
-    # All turn about the same axis, so the shares simply add up.
+    # All rotate about the same axis, so the parts add up.
     return girdle, rotation(-sum(_SHARES["girdle"].values()) * beyond) @ swing
 
 

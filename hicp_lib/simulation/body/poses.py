@@ -1,8 +1,8 @@
-"""Poses of people near a robot, drawn within the limits of their joints.
+"""Random poses of people near a robot, within joint limits.
 
-A pose is put together from legs and trunk, arms and hands. Angles are drawn from ranges in
-degrees, arms that go to a place are solved by `reach`, and a pose in which the body runs through
-itself is drawn again with more room for the arms.
+A pose consists of legs and trunk, arms and hands. Angles are sampled from ranges in degrees, arms that reach
+for a position are solved by `reach`, and a pose with self-collision is sampled again with more room for the
+arms.
 """
 
 from collections.abc import Callable
@@ -52,9 +52,9 @@ def sample_joints(rng: np.random.Generator, body: Body, kind: str | None = None,
     rng : numpy.random.Generator
     body : Body
     kind : str, optional
-        One of `KINDS`; drawn as well when left out.
+        One of `KINDS`; sampled by default.
     shape : int or str or array, shape (n_shapes,), optional
-        Whose pose it will be, as in `pose_body`; arms keep clear of that shape's body.
+        The shape to pose, as in `pose_body`; arms keep clear of its body.
 
     Returns
     -------
@@ -85,12 +85,12 @@ def sample_joints(rng: np.random.Generator, body: Body, kind: str | None = None,
             best, best_gap_m = joints, gap_m
         if gap_m > -_PENETRATION_M:
             break
-    # Hardly ever needed: the pose that comes nearest to keeping clear, or none at all.
+    # Rarely needed: the pose with the least collision, or none at all.
     return best or _draw(Draft(rng, body, model, 0.0), "standing") or {}
 
 
 def _draw(draft: Draft, kind: str) -> Joints | None:
-    """One draw of a kind, hands included; None where an arm cannot go where it should."""
+    """One sample of a kind, with hands; None if an arm cannot reach its position."""
     legs, place_arms, hands = KINDS[kind]
     joints = uniform(draft.rng, _RANGES_DEG["trunk"]) | legs(draft.rng)
     for side in ("left", "right"):
@@ -124,7 +124,7 @@ def _lean(rng: np.random.Generator) -> Joints:
 
 
 def _level_feet(joints: Joints) -> Joints:
-    """Ankles that keep the soles level, as far as they bend."""
+    """Ankle angles that keep the soles horizontal, within limits."""
     limits = np.radians(LIMITS_DEG["left_ankle_flexion"])
     return {
         f"{side}_ankle_flexion": float(
@@ -149,4 +149,4 @@ KINDS: dict[str, tuple[Callable, Callable, tuple[str, ...]]] = {
     "face": (_stand, arms.near_face, _CALM),
     "sitting": (_sit, arms.of_any_kind, (*_CALM, *_ACTIVE)),
 }
-"""Kinds of poses: what draws legs and trunk, what places the arms, and kinds of hands."""
+"""Kinds of poses: functions that sample legs and trunk, and arms, and kinds of hands."""

@@ -1,4 +1,4 @@
-"""Bringing a wrist to a point: inverse kinematics of an arm of two segments."""
+"""Move a wrist to a point: inverse kinematics of an arm with two segments."""
 
 from collections.abc import Sequence
 
@@ -22,7 +22,7 @@ def reach(
     wrist_m: np.ndarray,
     elbow_toward: Sequence[float] = (0.0, 0.3, -1.0),
 ) -> Joints | None:
-    """Bend shoulder and elbow so that the wrist comes to a point, or as near as the arm is long.
+    """Bend shoulder and elbow so that the wrist reaches a point, or gets as near as possible.
 
     The elbow can still swivel about the line from shoulder to wrist: of the positions within the
     joints' limits it takes the one furthest in the direction `elbow_toward`.

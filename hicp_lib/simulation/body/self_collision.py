@@ -1,6 +1,6 @@
-"""Self-collision: how far a posed person's arms keep from trunk, head, thighs and from each other.
+"""Self-collision: distances of a posed person's arms from trunk, head, thighs and each other.
 
-A cheap test on the bones alone, for rejecting poses in which the body runs through itself: the
+A cheap test on the bones only, to reject self-colliding poses: the
 trunk is a stack of elliptic slices, the head an ellipsoid, limbs are rows of spheres.
 """
 
@@ -18,7 +18,7 @@ Spheres = tuple[np.ndarray, np.ndarray]  # centres (n, 3) and radii (n,)
 LIMBS = PEOPLE["limb_spheres"]
 """Limbs as spheres, those of the arm first: region, first and last bone head, fractions of the way between.
 
-Most of the upper arm may touch the trunk; a bit more than the whole way to the last knuckle is a fingertip.
+Most of the upper arm may touch the trunk; slightly beyond the last knuckle is a fingertip.
 """
 _SIZES = {"bones": (-1, 13), "centres_m": (-1, 13, 3), "half_axes_m": (-1, 13, 3), "radii_m": (-1, 4)}
 
@@ -63,7 +63,7 @@ def collision_model(body: Body, shape: Shape) -> CollisionModel:
     Raises
     ------
     InputError
-        If the file of what was measured is missing or not such a file.
+        If the file of measurements is missing or malformed.
     """
     number = shape_number(body, shape)
     tables = read_arrays(DATA_DIR / "body_sizes.npz", _SIZES, "sizes of bodies", "tools/measure_sizes.py")

@@ -1,10 +1,9 @@
-"""Smooth edges: where surfaces meet, pixels mix their neighbours' colours by coverage.
+"""Antialiasing: at edges of surfaces, pixels mix their neighbours' colours by coverage.
 
-Only rays are cast anew, nothing is shaded again: one ray through each border between two pixels,
-which takes the colour of the one that shows the same thing. A pixel's four borders are met at
-points of a rotated square, mirrored from pixel to pixel so that neighbours share them
-(FLIPQUAD: Akenine-Moller, "An extremely inexpensive multisampling scheme", 2003); its own middle
-counts as a fifth sample.
+Additional rays are cast, but nothing is shaded again: one ray through each border between two pixels, which
+takes the colour of the pixel that shows the same surface. The sample points on a pixel's four borders form a
+rotated square, mirrored from pixel to pixel so that neighbours share them (FLIPQUAD: Akenine-Moller, "An
+extremely inexpensive multisampling scheme", 2003); its centre is a fifth sample.
 """
 
 import numpy as np
@@ -72,7 +71,7 @@ def smooth_edges(
     borders, around = np.unique([middle - 1, middle + 1, middle - wide, middle + wide], return_inverse=True)
     shown = _alike(borders, trace, scene, camera)
     flat = image.reshape(-1, 3)
-    # Averaged after compression: a bright window does not eat its frame.
+    # Averaged after compression, so that a bright window does not swallow its frame.
     colour, mixed = _compressed(flat.take(shown, axis=0)), _compressed(flat.take(edges, axis=0))
     for numbers in around:
         mixed += colour.take(numbers, axis=0)
@@ -104,7 +103,7 @@ def _alike(borders: np.ndarray, trace: Trace, scene: RayScene, camera: PlacedCam
 
 
 def _difference(trace: Trace, pixels: np.ndarray, found: Trace, scene: RayScene) -> np.ndarray:
-    """How little pixels show what samples found: another surface, another depth, another slant."""
+    """Difference between pixels and samples: in surface, depth and orientation."""
     depth = np.minimum(found.depth_m, np.float32(1e3))
     cost = np.abs(np.minimum(trace.depth_m.take(pixels), np.float32(1e3)) - depth) / depth
     cost += 10 * (trace.surface.take(pixels) != found.surface)

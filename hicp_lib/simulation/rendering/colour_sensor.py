@@ -1,4 +1,4 @@
-"""From light to an 8-bit image: lens, exposure, noise and tone, as a consumer camera does it."""
+"""From light to an 8-bit image: lens, exposure, noise and tone curve of a consumer camera."""
 
 from dataclasses import dataclass
 
@@ -99,7 +99,7 @@ def _noise_tile() -> np.ndarray:
 
 
 def _noise(height: int, width: int, rng: np.random.Generator) -> np.ndarray:
-    """A random piece of the noise, (height, width, 3); drawing it anew would cost more than shading."""
+    """A random piece of the noise tile, (height, width, 3); new noise would cost more than shading."""
     tile = _noise_tile()
     row, column = (rng.integers(0, _TILE_PX - size + 1) for size in (height, width))
     piece = tile[row : row + height, column : column + width]

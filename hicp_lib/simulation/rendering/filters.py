@@ -7,7 +7,7 @@ import numpy as np
 from hicp_lib.simulation.rendering.gbuffer import GBuffer
 from hicp_lib.simulation.rendering.raycast import DEPTH_STEP, cross, dot
 
-_OFF_PLANE_M = 0.012  # from the tangent plane of a pixel's surface: further away it is another one
+_OFF_PLANE_M = 0.012  # from the tangent plane of a pixel's surface: further away counts as another surface
 
 
 def tilt_by_height(normals: np.ndarray, height_m: np.ndarray, gbuffer: GBuffer) -> None:
@@ -60,7 +60,7 @@ def sum_within(
     surface : array of int, shape (rows, columns)
     positions_m, normals : array, shape (3, rows, columns)
     rounds : int
-        At most 3, lest the sums overflow.
+        At most 3, so that sums do not overflow.
 
     Returns
     -------

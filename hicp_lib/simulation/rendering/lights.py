@@ -1,4 +1,4 @@
-"""Lights, and how surfaces return them.
+"""Lights, and their reflection by surfaces.
 
 Area lights are sampled once per pixel on a repeating 4 x 4 pattern of positions, so that a
 filter over 4 x 4 pixels which respects edges removes the noise and leaves soft shadows (interleaved
@@ -91,7 +91,7 @@ def diffuse_and_highlight(
     view: np.ndarray,
     shading: Shading,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What unshadowed light does at each of n points.
+    """Unshadowed light reflected at each of n points.
 
     Softness lets red light creep past the terminator further than green and blue, which is what
     makes skin look like skin.
@@ -131,7 +131,7 @@ def diffuse_and_highlight(
 
 
 def _creeping(n_l: np.ndarray, softness: np.ndarray) -> np.ndarray:
-    """Diffuse light by the cosine `n_l` of its angle, where red creeps furthest, (3, n)."""
+    """Diffuse light by the cosine `n_l` of its angle, which reaches furthest for red, (3, n)."""
     wrap = softness * column([0.40, 0.16, 0.10])
     creeping = n_l + wrap
     wrap += 1

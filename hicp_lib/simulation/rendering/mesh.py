@@ -21,8 +21,8 @@ class Mesh:
     normals : array, shape (n_vertices, 3)
         Unit vectors.
     coords : array, shape (n_vertices, n_coords)
-        What patterns are looked up with; interpolated over each triangle. The meaning is
-        the material's: texture coordinates, rest-pose positions, ...
+        Coordinates for looking up patterns, interpolated over each triangle. Their meaning depends on the
+        material: texture coordinates, rest-pose positions, ...
     """
 
     vertices_m: np.ndarray
@@ -34,7 +34,7 @@ class Mesh:
 def vertex_normals(vertices_m: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Area-weighted unit vertex normals, shape (n_vertices, 3), float32."""
     flat = np.ascontiguousarray(triangles.T, np.intp).ravel()
-    # Whole components are several times faster to work on than rows of three.
+    # Operations on whole components are several times faster than on rows of three.
     a, b, c = np.moveaxis(np.ascontiguousarray(vertices_m.T).take(flat, axis=1).reshape(3, 3, -1), 1, 0)
     (ux, uy, uz), (vx, vy, vz) = b - a, c - a
     normals = np.empty(vertices_m.shape, np.float32)
@@ -105,7 +105,7 @@ def cut(triangles: np.ndarray, field: np.ndarray) -> Cut:
 
 
 def smoothing(triangles: np.ndarray, n_vertices: int) -> sparse.csr_array:
-    """A step of smoothing as a matrix: vertices move most of the way to the middle of their neighbours.
+    """A smoothing step as a matrix: vertices move most of the way to the mean of their neighbours.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def smoothing(triangles: np.ndarray, n_vertices: int) -> sparse.csr_array:
     ends = np.concatenate([pairs, pairs[:, ::-1]]).T
     shape = (n_vertices, n_vertices)
     mean = sparse.coo_array((np.ones(len(ends[0]), np.float32), ends), shape=shape).tocsr()
-    # Eighths are dealt in turn: of more neighbours than eight the last get none.
+    # Eighths are assigned in turn: beyond eight neighbours, the last get none.
     count = np.diff(mean.indptr)
     number = np.arange(mean.nnz) - np.repeat(mean.indptr[:-1], count)
     mean.data = ((7 - number) // np.repeat(count, count) + 1).astype(np.float32) / 8

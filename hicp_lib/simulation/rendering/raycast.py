@@ -12,7 +12,7 @@ from hicp_lib.core.environment import with_variables
 from hicp_lib.simulation.rendering.camera import join_rays
 from hicp_lib.simulation.rendering.surfaces import Surface
 
-# Open3D would announce and start its web viewer in every notebook that renders.
+# Otherwise Open3D starts its web viewer in every notebook that renders.
 with with_variables(OPEN3D_DISABLE_WEB_VISUALIZER="true"):
     import open3d as o3d
 
@@ -63,7 +63,7 @@ class RayScene:
         self.surfaces = surfaces
         n_triangles = [len(s.mesh.triangles) for s in surfaces]
         self.first_vertex = np.cumsum([0, *(len(s.mesh.vertices_m) for s in surfaces)])
-        # One more for the triangle that is none, -1.
+        # One more for "no triangle", -1.
         self.surface_of_triangle = np.append(
             np.repeat(np.arange(len(surfaces), dtype=np.int16), n_triangles), np.int16(-1)
         )
@@ -110,7 +110,7 @@ class RayScene:
         )
 
     def occluded(self, rays: np.ndarray, end: float = 1.0) -> np.ndarray:
-        """Whether rays (n, 6) meet something before ``origin + end * direction``, shape (n,), bool."""
+        """Whether rays (n, 6) hit something before ``origin + end * direction``, shape (n,), bool."""
         return self._scene.test_occlusions(_tensor(rays), tnear=0.0, tfar=end, nthreads=N_THREADS).numpy()
 
 
@@ -119,11 +119,10 @@ def _tensor(values: np.ndarray) -> o3d.core.Tensor:
 
 
 def trace_image(scene: RayScene, centre_m: np.ndarray, directions: np.ndarray, fine: np.ndarray) -> Trace:
-    """Trace an image's rays, directions (3, height, width), but not where it is plain.
+    """Trace an image's rays, directions (3, height, width), skipping pixels inside a triangle.
 
-    Every second row and column is traced. Between four of those that meet one and the same
-    triangle the rest is known: 1 / depth is linear over a plane's image. Everything else is
-    traced as well.
+    Every second row and column is traced. Between four of these that hit the same triangle, depth is
+    interpolated: 1 / depth is linear over a plane's image. All other pixels are traced as well.
 
     Parameters
     ----------
@@ -132,7 +131,7 @@ def trace_image(scene: RayScene, centre_m: np.ndarray, directions: np.ndarray, f
         Where the rays begin.
     directions : array, shape (3, height, width)
     fine : array of bool, shape (n_surfaces,)
-        Near which surfaces all is traced.
+        Surfaces near which every pixel is traced.
 
     Returns
     -------
@@ -168,7 +167,7 @@ def trace_image(scene: RayScene, centre_m: np.ndarray, directions: np.ndarray, f
 
 
 def _inside_one(triangle: np.ndarray, inner: np.ndarray) -> np.ndarray:
-    """Whether a place, its neighbours below and to the right and all around them show one triangle.
+    """Whether a pixel, its neighbours below and right, and all around them show one triangle.
 
     `triangle` are the triangles seen, `inner` where that may be so, both (rows, columns).
     """
@@ -196,7 +195,7 @@ def _between(values: np.ndarray, height: int, width: int) -> np.ndarray:
 
 
 def interpolate(values: np.ndarray, corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Values per vertex at places of triangles.
+    """Interpolate values per vertex within triangles.
 
     Parameters
     ----------
@@ -218,16 +217,16 @@ def interpolate(values: np.ndarray, corners: np.ndarray, weights: np.ndarray) ->
     return result
 
 
-# Row by row and without checks, numpy copies chosen places several times faster than by indexing.
+# Row by row and without checks, numpy copies selected elements several times faster than by indexing.
 
 
 def pick(values: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """The same places of every row, (..., n) to (..., len(places)); places must be within bounds."""
+    """The same elements of every row, (..., n) to (..., len(places)); indices must be within bounds."""
     return values.take(places, axis=-1, mode="clip")
 
 
 def place(values: np.ndarray, places: np.ndarray, chosen: Iterable[ArrayLike]) -> None:
-    """Put values at the same places of every row.
+    """Set the same elements of every row.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From surfaces, lights and a camera to what the camera sees: colour, depth, people and parts."""
+"""Render surfaces and lights to a camera's view: colour, depth, people and body parts."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,12 +15,12 @@ from hicp_lib.simulation.rendering.raycast import RayScene, dot, doubled, place,
 from hicp_lib.simulation.rendering.shadows import visibility
 from hicp_lib.simulation.rendering.surfaces import Surface, column
 
-_BLOCK = 16_384  # pixels shaded at a time: what the processor's cache holds
+_BLOCK = 16_384  # pixels shaded at a time, to fit the processor's cache
 
 
 @dataclass(frozen=True)
 class World:
-    """All there is to see.
+    """A scene to render.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class World:
     lights : list of Light
     ambient : Ambient
     backdrop : array, shape (3,)
-        Linear RGB where nothing is.
+        Linear RGB of the background.
     """
 
     surfaces: list[Surface]
@@ -38,7 +38,7 @@ class World:
 
     @cached_property
     def rays(self) -> RayScene:
-        """The surfaces, ready to be traced; made once for all frames in which nothing moves."""
+        """The surfaces, ready for ray tracing; shared by all frames without motion."""
         return RayScene(self.surfaces)
 
 
@@ -67,8 +67,8 @@ class Frame:
 def render(world: World, camera: PlacedCamera, rng: np.random.Generator) -> Frame:
     """Render one frame.
 
-    Depth and people are exact at every pixel, but only people are shaded there: they are in focus.
-    What is around them is shaded at every second row and column, and a little out of focus.
+    Depth and people are exact at every pixel, but only people are shaded at full resolution, in focus.
+    Everything else is shaded at every second row and column, slightly out of focus.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def _shade_block(world: World, shading: Shading, positions_m, direction, seen: n
     facing = 1 - np.clip(dot(shading.normals, view), 0, 1)
     facing *= facing
     fresnel = shading.gloss * (1 + 4 * facing * facing) * (1 - np.float32(0.7) * shading.roughness)
-    # Part of what is hidden returns by bouncing about: crevices are not black.
+    # Part of the blocked light arrives by indirect reflection: crevices are not black.
     diffuse *= seen[-1] * np.float32(0.85) + np.float32(0.15)
     highlight = fresnel * diffuse
     for source, visible in zip(world.lights, seen[:-1], strict=True):

@@ -1,4 +1,4 @@
-"""How much of each light every pixel sees: one ray towards a point of each light, then a filter."""
+"""Visible fraction of each light at every pixel: one ray towards a point of each light, then a filter."""
 
 import numpy as np
 
@@ -23,7 +23,7 @@ def visibility(
 ) -> np.ndarray:
     """Visible share of each light and of the surroundings.
 
-    Every second pixel is asked, as on a chessboard, and the filter fills in the others.
+    Every second pixel is sampled, in a checkerboard pattern, and the filter fills in the others.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def visibility(
     normals : array, shape (3, rows, columns)
         Of all pixels of the G-buffer's grid.
     sharp : bool
-        Whether the filter reaches less far.
+        Whether to use a smaller filter.
     rng : numpy.random.Generator
 
     Returns
@@ -68,7 +68,7 @@ def _sees(scene: RayScene, source: lights.Light | None, origins_m, normals, offs
         return ~scene.occluded(join_rays(origins_m, normals + around), AMBIENT_REACH_M)
     s, t = 2 * offsets - 1
     towards = column(source.centre_m) + s * column(source.half_u_m) + t * column(source.half_v_m) - origins_m
-    facing = np.flatnonzero(dot(towards, normals) > 0)  # what faces away is dark without asking
+    facing = np.flatnonzero(dot(towards, normals) > 0)  # pixels facing away are dark without a ray
     seen = np.ones(len(origins_m.T), bool)
     seen[facing] = ~scene.occluded(join_rays(origins_m, towards).take(facing, axis=0), 0.98)
     return seen

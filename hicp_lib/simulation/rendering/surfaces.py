@@ -1,4 +1,4 @@
-"""What a renderer needs to know of things: surfaces and their looks."""
+"""Inputs of the renderer: surfaces and their materials."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ class Look:
     roughness : float or array, shape (n,)
         Of the highlight, in (0, 1].
     softness : float or array, shape (n,)
-        How far light creeps past the terminator, as in skin.
+        How far light extends past the terminator, as in skin.
     glow : float or array, shape (3, n) or (3, 1)
-        Light given off, linear RGB.
+        Emitted light, linear RGB.
     """
 
     albedo: np.ndarray
@@ -58,9 +58,9 @@ class Surface:
     ----------
     mesh : Mesh
     material : Look or callable
-        What it looks like.
+        Its appearance.
     person : int
-        Whose it is; -1: nobody's.
+        Index of its person; -1: none.
     parts : array or None, shape (n_triangles,), dtype int16
         Body part per triangle.
     """

@@ -18,23 +18,23 @@ _REMAP_COLUMNS = 8192  # OpenCV's remap takes no array longer than 32767
 
 Tile = tuple[np.ndarray, float]
 Pattern = Callable[..., Tile]
-"""Makes one period, (size, size[, channels]), size a power of two, and says its width in metres."""
+"""Returns one period, (size, size[, channels]), with size a power of two, and its width in metres."""
 
 
 def sample(
     pattern: Pattern, uv_m: np.ndarray, footprint_m: np.ndarray | float, *numbers: float
 ) -> np.ndarray:
-    """Look a pattern up, bilinearly, blurred to the footprint.
+    """Sample a pattern bilinearly, blurred to the footprint.
 
     Parameters
     ----------
     pattern : callable
-        One of this module's.
+        A pattern of this module.
     uv_m : array, shape (2, n)
     footprint_m : float or array, shape (n,)
         How many metres of surface one pixel sees.
     *numbers : float
-        What the pattern takes.
+        Parameters of the pattern.
 
     Returns
     -------

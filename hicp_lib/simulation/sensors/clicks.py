@@ -1,4 +1,4 @@
-"""Markers as someone would click them: where they are in the image, with the error of a hand."""
+"""Simulated clicks on markers: their positions in the image, with a human error."""
 
 import numpy as np
 import pandas as pd
@@ -9,8 +9,8 @@ from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import Recording, read_exact_depth_m
 
-# A marker is clicked if nothing is this much nearer at its place: it sits on the skin, so its own
-# limb is not.
+# A marker is clicked if nothing is nearer by this much at its pixel; it is on the skin, so its own limb is
+# not.
 _IN_FRONT_M = 0.03
 
 

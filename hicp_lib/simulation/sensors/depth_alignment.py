@@ -1,4 +1,4 @@
-"""Depth moved from the imager that measured it to the colour camera beside it."""
+"""Align depth from the imager that measured it to the colour camera beside it."""
 
 import numpy as np
 

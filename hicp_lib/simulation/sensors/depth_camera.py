@@ -1,4 +1,4 @@
-"""A depth camera beside the colour camera: what it sees of a scene, moved to where the colour camera sees it.
+"""A depth camera beside the colour camera: its depth, aligned to the colour image.
 
 Depth is measured in an imager's own view and has the errors of its kind (`stereo_camera`, `time_of_flight`).
 Then it is aligned to the colour camera. Both look the same way.
@@ -23,7 +23,7 @@ _HAIR_PARTS = (REGIONS.index("scalp"), REGIONS.index("scalp") + RIGHT)
 
 @dataclass(frozen=True, kw_only=True)
 class DepthCamera:
-    """Geometry of a depth camera, and what all have in common; zero switches an error off.
+    """Geometry of a depth camera, and common settings; zero switches an error off.
 
     Attributes
     ----------
@@ -32,13 +32,13 @@ class DepthCamera:
     focal_px : float
         Of the imager.
     baseline_m : float
-        From the imager to what it is compared with; f B is the disparity times depth.
+        Baseline; f B is the disparity times depth.
     colour_offset_m : float
         From the colour camera to the imager, to the right.
     nearest_m, max_range_m : float
         No depth nearer, and beyond.
     depth_units_per_m : float
-        What depth is a multiple of.
+        Resolution of depth.
     """
 
     width_px: int
@@ -61,7 +61,7 @@ class DepthCamera:
         Parameters
         ----------
         true_px : array, shape (h, w), dtype float32
-            Disparity of what is there in a part of its view; 0 where nothing is.
+            True disparity in a part of its view; 0 where nothing is.
         hair : array of bool, shape (h, w)
         first_column : int
             Where that part begins.
@@ -81,7 +81,7 @@ def simulate_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCamera,
     Parameters
     ----------
     scene : RayScene
-        What is there, such as `Frame.rays` of a rendered frame.
+        The scene, such as `Frame.rays` of a rendered frame.
     colour : PlacedCamera
         The colour camera; what lies outside the imager's view has no depth.
     settings : DepthCamera
@@ -154,8 +154,8 @@ def _true_disparity(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Disparity (0 where nothing is) and where there is hair, both (height, width).
 
-    Disparity is linear over a plane's image. So every second row and column is cast, and where
-    those bend nowhere what lies between is interpolated; all the rest is cast as well.
+    Disparity is linear over a plane's image. So every second row and column is cast, and where those are
+    linear, values between are interpolated; all other rays are cast as well.
     """
     shape = (view.height_px, view.width_px)
     directions = image_directions(view)[:, ::2, ::2]

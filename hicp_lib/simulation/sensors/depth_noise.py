@@ -1,4 +1,4 @@
-"""What errors of stereo matching have in common: they are smooth over the matching window."""
+"""Noise of stereo matching, which is smooth over the matching window."""
 
 from statistics import NormalDist
 
@@ -33,7 +33,7 @@ def correlated_noise(shape: tuple[int, int], window_px: int, rng: Rng) -> np.nda
 
 @memoised(4)
 def _noise_tile(window_px: int) -> np.ndarray:
-    """Square noise that goes on at its other side: drawing it anew would cost more than matching."""
+    """A periodic noise tile: new noise would cost more than matching."""
     white = np.random.default_rng(window_px).standard_normal((_TILE_PX, _TILE_PX), np.float32)
     sigma = np.sqrt((window_px**2 - 1) / 12)  # the window's own standard deviation
     if sigma == 0:
@@ -45,7 +45,7 @@ def _noise_tile(window_px: int) -> np.ndarray:
 
 
 def patches(shape: tuple[int, int], share: float, window_px: int, rng: Rng) -> np.ndarray:
-    """Patches as large as a matching window that cover a share of the image.
+    """Patches of the size of a matching window that cover a fraction of the image.
 
     Parameters
     ----------

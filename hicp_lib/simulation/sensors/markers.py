@@ -1,4 +1,4 @@
-"""Reflective markers of motion capture: where a lab tapes them, and where they are in a pose.
+"""Reflective markers of motion capture: their attachment to the body, and positions in a pose.
 
 Two on each shoulder, elbow and wrist: on opposite sides of elbow and wrist, so that their mean is near
 the joint (the paper's section IV-C takes that mean for the joint), and both on the outer side of the
@@ -86,9 +86,9 @@ def _measured() -> tuple[np.ndarray, np.ndarray]:
 
 
 def body_scene(person: PosedBody, obstacles: tuple[Mesh, ...] = ()) -> RayScene:
-    """What may hide markers: the person's skin, and other meshes. Markers lie on clothes, not under them.
+    """Occluders of markers: the person's skin, and other meshes. Markers are on clothes, not under them.
 
-    The skin is that between every few vertices: as good as all of it, and ready in a third of the time.
+    The skin is reduced to some of its vertices: equally good, and ready in a third of the time.
 
     Parameters
     ----------

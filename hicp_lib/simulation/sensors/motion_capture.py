@@ -1,8 +1,8 @@
 """A motion capture system like Qualisys': cameras around the room, markers, noise and dropouts.
 
-A marker is measured while at least two cameras see it; where its centre is, is known to a fraction
-of a millimetre. Trajectories too short to be recognised again are lost. The system's world
-frame is its own: z up, its origin and heading wherever the calibration frame lay on the floor.
+A marker is measured while at least two cameras see it, with an error of a fraction of a millimetre.
+Trajectories too short to be identified again are lost. The system has its own world frame: z up, with origin
+and heading set by the calibration frame on the ground.
 """
 
 from collections.abc import Callable
@@ -35,13 +35,13 @@ class MocapSystem:
     noise_m : float
         Standard deviation of each coordinate; 0 for none.
     min_cameras : int
-        That must see a marker.
+        Number of cameras that must see a marker.
     shortest_s : float
         Trajectories between dropouts that are shorter are lost; 0 keeps them.
     n_cameras : int
-        How many stand on a ring around the scene.
+        Number of cameras on a ring around the scene.
     ring_m, height_m : float
-        Its radius, and how high it is.
+        Its radius and height.
     """
 
     rate_hz: float = 100.0
@@ -71,7 +71,7 @@ def room_cameras_m(system: MocapSystem, middle_m: np.ndarray) -> np.ndarray:
 
 
 def count_seeing(scene: RayScene, points_m: np.ndarray, cameras_m: np.ndarray) -> np.ndarray:
-    """How many cameras see each marker past what is in the scene.
+    """Number of cameras that see each marker past the objects in the scene.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def track_markers(
     every: int = 4,
     obstacles: tuple[Mesh, ...] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Follow the markers of a moving person, and others that stay where they are.
+    """Trajectories of the markers on a moving person, and of fixed markers.
 
     Parameters
     ----------
@@ -113,9 +113,9 @@ def track_markers(
         Increasing.
     cameras_m : array, shape (n_cameras, 3)
     every : int, optional
-        The person is posed at every so many times; splines lead from one to the next.
+        The person is posed at every n-th time; splines interpolate between.
     obstacles : tuple of Mesh, optional
-        What hides markers besides the person.
+        Further occluders.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def track_markers(
 
 
 def mocap_frame(rng: Rng) -> np.ndarray:
-    """T_mocap_world (4, 4): where a calibration frame laid down by hand put the system's world frame."""
+    """T_mocap_world (4, 4): a world frame set by a manually placed calibration frame."""
     T_mocap_world = np.eye(4)
     tilt = rng.normal(0, np.radians(0.2), 3) * [1, 1, 0]  # of the floor
     T_mocap_world[:3, :3] = rotation(tilt) @ rotation([0, 0, rng.uniform(-np.pi, np.pi)])
@@ -157,7 +157,7 @@ def measure(
     system: MocapSystem,
     rng: Rng,
 ) -> MotionCapture:
-    """What the system exports of markers that move.
+    """The system's measurements of moving markers.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A stereo depth camera like Intel's RealSense D435: what it measures of a scene, and what it misses.
+"""A stereo depth camera like Intel's RealSense D435, with its errors.
 
 Depth is measured in the left imager's view as disparity, d = f B / z, and has the errors of stereo
 matching; the colour camera sits 15 mm to the left of the left imager. Sources: Intel's "Tuning depth
@@ -22,7 +22,7 @@ _EDGE_GROWTH = 0.06  # and how far near surfaces, which stand out, spread over f
 
 @dataclass(frozen=True, kw_only=True)
 class StereoCamera(DepthCamera):
-    """Errors of a stereo camera beside those of every depth camera; zero (or False) switches one off.
+    """Errors of a stereo camera in addition to those of every depth camera; zero (or False) switches one off.
 
     Its imager is the left one, its baseline leads to the right one.
 
@@ -37,7 +37,7 @@ class StereoCamera(DepthCamera):
     edge_holes : float
         Share of that slope that gets no depth.
     disparity_step_px : float
-        What disparity is a multiple of.
+        Resolution of disparity.
     left_band : bool
         No depth where the right imager's image ends, at the left edge.
     shadow : bool
@@ -103,10 +103,10 @@ D435_VGA = replace(D435, width_px=640, focal_px=384.0, nearest_m=0.152)
 
 
 def _edges(true_px: np.ndarray, settings: StereoCamera, rng: Rng) -> tuple[np.ndarray, np.ndarray]:
-    """Disparity as windows that reach over depth steps find it, and where they find any.
+    """Disparity from windows that overlap steps in depth, and where there is one.
 
-    A window takes the disparity of the surface that fills most of it; about half and half, one
-    in between. Texture decides as well, so outlines are ragged.
+    A window gets the disparity of the surface that fills most of it or, if both fill about half, a value in
+    between. Texture also has an influence, so outlines are ragged.
     """
     box = np.ones((settings.window_px, settings.window_px), np.uint8)
     small = np.ones((3, 3), np.uint8)
@@ -126,7 +126,7 @@ def _edges(true_px: np.ndarray, settings: StereoCamera, rng: Rng) -> tuple[np.nd
 
 
 def _hidden_from_right(true_px: np.ndarray) -> np.ndarray:
-    """Whether something nearer falls on the same pixel of the right imager, (height, width)."""
+    """Whether a nearer surface projects to the same pixel of the right imager, (height, width)."""
     height, width = true_px.shape
     margin = int(np.ceil(true_px.max(initial=0))) + 2
     column = np.arange(width, dtype=np.float32) - true_px + margin

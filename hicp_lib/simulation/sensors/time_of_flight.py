@@ -1,10 +1,10 @@
 """A time-of-flight depth camera like Microsoft's Azure Kinect: errors of another kind than stereo's.
 
-Light whose brightness is modulated comes back with a phase, 4 pi f z / c, and an amplitude, which falls
-with the square of the distance and with the slope of the surface. A pixel sums what comes from all it covers,
-and a little of what the lens scatters from all around: at outlines the sum has the phase of neither surface
-(flying pixels), and near bright things depth leans towards theirs. Weak light is noisy, and too weak has no
-depth.
+Light whose brightness is modulated comes back with a phase, 4 pi f z / c, and an amplitude, which falls with
+the square of the distance and with the slope of the surface. A pixel sums what comes from all it covers, and
+a little of what the lens scatters from all around: at outlines the sum has the phase of neither surface
+(flying pixels), and near bright things depth leans towards theirs. Weak light is noisy, and too weak light
+gives no depth.
 
 Sources: Microsoft's hardware specification of the Azure Kinect DK for geometry, range and errors (random up
 to 17 mm, systematic up to 11 mm and 0.1 % of the distance), which Tölgyessy et al. ("Evaluation of the Azure
@@ -26,7 +26,7 @@ _LEAST_COSINE = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class TimeOfFlightCamera(DepthCamera):
-    """Errors of a time-of-flight camera beside those of every depth camera; zero switches one off.
+    """Errors of a time-of-flight camera in addition to those of every depth camera; zero switches one off.
 
     Amplitudes are shares of that of a white surface 1 m away that faces the camera.
 
@@ -36,7 +36,7 @@ class TimeOfFlightCamera(DepthCamera):
     axial_noise_m : float
         Standard deviation at amplitude 1, more in proportion to 1 / amplitude.
     noise_px : int
-        Side of the neighbourhood in which noise is alike, odd.
+        Side of the neighbourhood in which noise is correlated, odd.
     blur_px : float
         Standard deviation of the spot that a point's light makes.
     stray : float
@@ -44,7 +44,7 @@ class TimeOfFlightCamera(DepthCamera):
     stray_px : int
         Side of the square that it scatters over.
     wiggle_m : float
-        Systematic error; a wave with the distance, four to a turn of the phase.
+        Amplitude of the systematic error, with four periods per turn of the phase.
     least_amplitude : float
         Weaker light has no depth.
     reflectivity, hair_reflectivity : float

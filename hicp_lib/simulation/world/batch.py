@@ -1,4 +1,4 @@
-"""Folders that many results at once are written to."""
+"""Output folders of batches, which can be resumed."""
 
 from collections.abc import Callable, Iterable
 from itertools import chain
@@ -22,7 +22,7 @@ def check_numbers(**limits: tuple[object, int, int]) -> None:
     Raises
     ------
     InputError
-        For the first that is no whole number or lies outside.
+        For the first that is not an integer or out of range.
 
     Examples
     --------
@@ -37,23 +37,23 @@ def keep_parts(
     out: Path, parts_dir: str, index: str, stamp: dict, n: int, made: Callable[[int], Iterable[Path]],
     once: Iterable[str],
 ) -> None:  # fmt: skip
-    """Keep what an interrupted run finished; drop what was made with something else, or is beyond `n`.
+    """Keep finished parts of an interrupted run; drop parts made with other settings, or beyond `n`.
 
-    What was made is known by what is kept beside the stamp: how many, and the names in `once`. All other
-    files, whoever's they are, stay.
+    The stored stamp records which files were made: how many parts, and the names in `once`. All other files
+    are left alone.
 
     Parameters
     ----------
     out : Path
-        Folder that is written to.
+        Output folder.
     parts_dir : str
-        Name of the folder in it that says what is finished.
+        Name of its subfolder that records finished parts.
     index : str
-        Name of the file in it without which it is nothing finished; it is removed.
+        Name of its file that marks the output as complete; it is removed.
     stamp : dict
-        What results depend on, JSON-able; kept there.
+        What results depend on, JSON-able; stored there.
     n : int
-        How many there will be.
+        Number of parts.
     made : callable
         Files of each.
     once : iterable of str
@@ -78,14 +78,14 @@ def keep_parts(
 
 
 def write_part(content: dict, part: Path, *files: Path) -> None:
-    """Say that a part is finished, once its files are there.
+    """Record that a part is finished, after writing its files.
 
     Parameters
     ----------
     content : dict
-        What else there is to say, JSON-able.
+        Further data, JSON-able.
     part : Path
-        The file that says it.
+        The file of the record.
     *files : Path
         Hashed with it.
     """
@@ -93,7 +93,7 @@ def write_part(content: dict, part: Path, *files: Path) -> None:
 
 
 def read_part(part: Path, *files: Path) -> dict | None:
-    """What `write_part` wrote; None where it, or a file, is not there or not whole."""
+    """The content of `write_part`; None if it, or a file, is missing or damaged."""
     try:
         content = read_json(part)
         return content if content["sha256"] == [sha256_file(path) for path in files] else None

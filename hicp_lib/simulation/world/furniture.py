@@ -23,7 +23,7 @@ def furnish(rng: Rng, half_m: np.ndarray, keep_clear_m: np.ndarray) -> list[Surf
     half_m : array, shape (2,)
         Half the room's sizes.
     keep_clear_m : array, shape (n, 3)
-        Discs (x, y, radius) where nothing is put.
+        Discs (x, y, radius) to keep free.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def legs(xs: Iterable[float], ys: Iterable[float], half: float, low: float, high
     Parameters
     ----------
     xs, ys : iterable of float
-        At all pairs of these they stand.
+        Positions: all pairs of these.
     half : float
         Half their width.
     low, high : float
@@ -164,7 +164,7 @@ def _cupboard(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
     return [Surface(_boxes_at(place, yaw, [((-a, -b, 0.05), (a, b, h)), *doors]), material)]
 
 
-# What makes a piece, how much room it takes (radius, m), and whether it stands at any angle.
+# Function that makes a piece, its size (radius, m), and whether it may have any orientation.
 _PIECES: list[tuple[Callable[[Rng, np.ndarray, float], list[Surface]], float, bool]] = [
     (_table, 0.85, False), (_chair, 0.35, True), (_chair, 0.35, True), (_sofa, 1.0, False),
     (_plant, 0.3, False), (_boxes, 0.4, True), (_lamp, 0.25, False), (_cupboard, 0.6, False),
@@ -174,7 +174,7 @@ _N_TRIES = 12
 
 
 def stool(rng: Rng, posed: PosedBody) -> Surface:
-    """Something to sit on, right under a sitting person."""
+    """A stool under a sitting person."""
     seat = posed.vertices_m[load_body().in_regions("hips", "torso", "thigh")]
     x, y = posed.keypoints_m[INDEX["mid_hip"], :2]
     near = np.hypot(seat[:, 0] - x, seat[:, 1] - y) < 0.2

@@ -1,4 +1,4 @@
-"""Rooms to stand in: walls, a floor, windows and doors, furniture and clutter.
+"""Rooms: walls, a floor, windows and doors, furniture and clutter.
 
 World frame: z up, floor at z = 0, metres. The room is a box around the origin.
 """
@@ -45,7 +45,7 @@ def make_room(rng: Rng, keep_clear_m: np.ndarray) -> Room:
     ----------
     rng : numpy.random.Generator
     keep_clear_m : array, shape (n, 3)
-        Discs (x, y, radius) on the floor where nothing is put: people, and the view of them.
+        Discs (x, y, radius) on the floor to keep free, for people and the view of them.
 
     Returns
     -------
@@ -114,7 +114,7 @@ def _shell(rng: Rng, half: np.ndarray, height: float, walls: list[_Wall]) -> lis
 
 
 def _on_wall(rng: Rng, wall: _Wall) -> list[Surface]:
-    """What hangs on a wall or opens in it, side by side along it."""
+    """Objects on a wall and openings in it, side by side."""
     surfaces: list[Surface] = []
     u = -wall.half_width + rng.uniform(0.1, 0.8)
     while u < wall.half_width - 0.5:
@@ -231,7 +231,7 @@ def _row_of_books(rng: Rng, span: Span, v: float, depth: float, room: float) -> 
         u += thick + 0.002
 
 
-# What is on a wall: how often, how wide (m), what makes it.
+# Objects on a wall: frequency, width (m), function that makes them.
 _ON_WALL: dict[str, tuple[float, float, Callable[[Rng, _Wall, Span], list[Surface]]]] = {
     "window": (0.22, 1.4, _window),
     "door": (0.13, 0.9, _door),

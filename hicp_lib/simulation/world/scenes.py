@@ -1,9 +1,9 @@
 """Data sets of rendered people: whole images with annotations in Halpe's layout.
 
-People are either all for development or all held out (see `simulation.body.identities`).
-Images are JPEG at high quality, as the photographs of COCO and Halpe are; a PNG of a noisy
-image would be five times as large and tell no more. Image k depends on the seed and k only, so
-the number of worker processes changes nothing, and a larger data set contains the smaller one.
+People are either all development or all held-out identities (see `hicp_lib.simulation.body.identities`).
+Images are JPEG at high quality, as the photographs of COCO and Halpe are; a PNG of a noisy image would be
+five times as large without more information. Image k depends on the seed and k only, so the number of worker
+processes does not matter, and a larger data set contains the smaller one.
 """
 
 from dataclasses import asdict
@@ -44,10 +44,10 @@ def render_dataset(
     """Render `n` images with 1 to 3 people each into a dataset folder.
 
     `out` gets `images/` and, last of all, `annotations.json`. Finished images of an interrupted
-    run are kept and not rendered again; what another seed or another version of the renderer
-    made is replaced. `area` is the visible segment's, `bbox` its bounds; visibility is 2
-    visible, 1 occluded, 0 outside the image (see `visibility.keypoint_visibility`). Each
-    person's true distance is kept as `distance_m`, and who it is as `identity`.
+    run are kept and not rendered again; images of another seed or renderer version are replaced. `area` is
+    the visible segment's, `bbox` its bounds; visibility is 2 visible, 1 occluded, 0 outside the image (see
+    `visibility.keypoint_visibility`). Each person's true distance is stored as `distance_m`, and the identity
+    as `identity`.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def render_dataset(
     workers : int or str, optional
         Processes, or the address of a Dask scheduler (`hicp_lib.core.executor.resolved`).
     progress : bool, optional
-        Whether a terminal is shown a bar.
+        Whether to show a bar on a terminal.
     split : str, optional
         Whose people: "development" or "held out".
 
@@ -74,7 +74,7 @@ def render_dataset(
     """
     out, workers = Path(out), resolved(workers)
     check_numbers(n=(n, 1, MAX_SCENES), seed=(seed, 0, _MAX_NUMBER))
-    split_members(split)  # a wrong name is told before anything is written
+    split_members(split)  # an unknown name fails before anything is written
     with locked_folder(out):
         stamp = {"renderer": key([render_dataset]), "seed": int(seed), "people": split}
         keep_parts(out, _PARTS_DIR, "annotations.json", stamp, int(n), partial(_files, out), [])
@@ -127,7 +127,7 @@ def render_scene(seed: int, index: int, split: str = HELD_OUT) -> tuple[np.ndarr
 
 
 def annotate(stage: Stage, frame: Frame) -> list[dict]:
-    """Everyone seen in a frame, as JSON-able dictionaries.
+    """All people visible in a frame, as JSON-able dictionaries.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Staging: who stands where, in what room and light, and where the photograph is taken from."""
+"""Staging: positions of people, room and light, and the camera's viewpoint."""
 
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -32,7 +32,7 @@ class Stage:
     people : list of PosedBody
         In the order of the surfaces' person numbers.
     identities : list of Identity
-        Whose they are; room, lights and camera are those of the first.
+        Their identities; room, lights and camera are those of the first.
     """
 
     world: World
@@ -48,7 +48,7 @@ def random_stage(rng: Rng, split: str = HELD_OUT) -> Stage:
     Parameters
     ----------
     rng : numpy.random.Generator
-        Draws the identities; all else is drawn from theirs.
+        For sampling the identities; everything else follows from their seeds.
     split : str, optional
         Of the identities.
 
@@ -72,7 +72,7 @@ def random_stage(rng: Rng, split: str = HELD_OUT) -> Stage:
     camera = _camera(taken, people[0])
     centre = camera.centre_m
     clear = [(x, y, 0.55) for x, y in places] + [(centre[0], centre[1], 0.7)]
-    if taken.random() < 0.88:  # the rest of the time something may stand before people
+    if taken.random() < 0.88:  # otherwise something may stand in front of people
         ways = (np.array(place) - centre[:2] for place in places)
         clear += [(*(centre[:2] + t * way), 0.3) for way in ways for t in (0.3, 0.5, 0.7)]
     room = make_room(first.draw("room"), np.array(clear))

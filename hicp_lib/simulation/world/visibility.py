@@ -1,4 +1,4 @@
-"""Which keypoints a camera sees."""
+"""Visibility of keypoints to a camera."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from hicp_lib.simulation.body.model import REGIONS
 from hicp_lib.simulation.rendering.camera import PlacedCamera, pixel_rays, project_world
 from hicp_lib.simulation.rendering.raycast import RayScene
 
-_TOUCHING_M = 0.002  # a keypoint that lies no further behind what is seen is on the surface
+_TOUCHING_M = 0.002  # a keypoint at most this far behind the visible surface is on it
 _RULES = PEOPLE["seen_through"]
 
 
@@ -34,7 +34,7 @@ _ALLOWED, _DEPTH_M = _tables()
 def keypoint_visibility(
     scene: RayScene, camera: PlacedCamera, keypoints_m: np.ndarray, person: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where a person's keypoints appear, and whether they are seen.
+    """Pixels of a person's keypoints, and whether they are visible.
 
     A ray goes from the camera to each keypoint. The keypoint is visible if the ray meets
     nothing before it, or first meets the same person, on a body part that the joint belongs to
@@ -50,7 +50,7 @@ def keypoint_visibility(
     keypoints_m : array, shape (136, 3)
         World frame.
     person : int
-        Whose they are.
+        Index of their person.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The quantities that a claim rests on, read from a run's result tables, and what is missing there."""
+"""Read the quantities of a claim from a run's result tables, and find what is missing."""
 
 import math
 from collections.abc import Iterable
@@ -25,15 +25,15 @@ class Quantity:
     Attributes
     ----------
     value : float
-        NaN where there is nothing to take it of, as the distance of what was never found.
+        NaN if undefined, such as the distance of a keypoint that was never found.
     low, high : float
-        Its 95 % interval; the number itself where it has none.
+        Its 95 % interval; the number itself if it has none.
     row : dict of str to object
-        The row it is from.
+        Its row.
     name : str
-        The row's, in the evidence.
+        The row's name, in the evidence.
     n : int
-        How many it was picked from.
+        Number of rows it was selected from.
     """
 
     value: float
@@ -51,11 +51,11 @@ class Quantity:
 
 
 class MissingError(Exception):
-    """What a claim needs is not among the results."""
+    """The results lack what a claim needs."""
 
 
 def select(side: Selection | float, results: Path) -> tuple[list[Quantity], list[str]]:
-    """The quantities of the rows a selection asks for; a number is one.
+    """The quantities of the selected rows; a number is a quantity itself.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def select(side: Selection | float, results: Path) -> tuple[list[Quantity], list
     MissingError
         If there is no such table, or no such row though it names no system.
     InputError
-        If it asks for a column that the table does not have.
+        If the table lacks a column of the selection.
     """
     if isinstance(side, float):
         return [Quantity(side, side, side, {}, "")], []
@@ -100,10 +100,10 @@ def select(side: Selection | float, results: Path) -> tuple[list[Quantity], list
 
 
 def is_rendered(results: Path, notebook: str) -> bool:
-    """Whether a notebook's run saw rendered people or simulated recordings.
+    """Whether a notebook's run used rendered people or simulated recordings.
 
-    Its stamp names the source and the recordings it was given; one of these may be simulated as well, and
-    says so in its folder.
+    Its stamp names the source and the given recordings; one of these may be simulated, too, which its folder
+    says.
     """
     path = results / notebook / "provenance.json"
     if not path.is_file():
@@ -114,7 +114,7 @@ def is_rendered(results: Path, notebook: str) -> bool:
     if recordings:
         given = [Path(folder) for folders in recordings for folder in _listed(folders) if folder]
         made.append(not given or any((folder / SIMULATION_FILE).is_file() for folder in given))
-    return any(made) or not made  # a notebook that takes neither makes all it looks at
+    return any(made) or not made  # a notebook with neither parameter makes its own data
 
 
 def _read(selection: Selection, results: Path) -> pd.DataFrame:
@@ -140,7 +140,7 @@ def _listed(value: Any) -> list:
 
 
 def _members(wanted: Any, present: Iterable[str]) -> list[str]:
-    """Who is meant: systems and the members of classes; who is none of several together for None."""
+    """Resolve names to systems, and classes to their members; None means all but combinations."""
     if wanted is None:
         return [name for name in present if not name.startswith(COMBINED)]
     classes = {f"{CLASS}combined": [name for name in present if name.startswith(COMBINED)]}

@@ -8,10 +8,10 @@ paper's numbers and orderings, each with the claims that cover it or the reason 
     >, <       the difference left - right lies above `margin`, or below -`margin`
     similar    left and right differ by less than `margin`
 
-A claim that names systems is tested on these only. A selection that names no detector speaks of *every* one
-that was run by itself (a combination has the body of another), and asks for `EVERY_NEEDS` of them. Beside a
-claim may stand a statement about the class that its systems belong to, or under choices of ours
-(`class_statement`, `class_tests`): it says how far a claim carries, and never decides its verdict.
+A claim that names systems is tested on these only. A selection without a detector means *every* one that was
+run, except combinations (which share the body of another), and needs at least `EVERY_NEEDS` of them. A claim
+may have a further statement about the class of its systems, or under choices of ours (`class_statement`,
+`class_tests`): it shows how far the claim generalises, and does not affect the verdict.
 """
 
 import math
@@ -45,11 +45,11 @@ class Selection:
     value : str
         Column of the quantity.
     greatest : bool
-        Only the row with the greatest value: what is so of one of them at least.
+        Only the row with the greatest value, for statements about at least one of them.
     low, high : str
         Columns of the quantity's interval; the number counts as exact when they are "".
     scale : float
-        Multiplies the quantity, to bring it to the claim's unit.
+        Factor that converts the quantity to the claim's unit.
     name : tuple of str
         Columns that name a row in the evidence.
     """
@@ -65,7 +65,7 @@ class Selection:
     name: tuple[str, ...] = ("detector",)
 
     def named(self, column: str) -> list[str]:
-        """The systems that `column` must be one of; none where every one is meant, or a class."""
+        """The systems to which `column` is restricted; empty if every one or a class is meant."""
         given = self.where.get(column, [])
         names = given if isinstance(given, list) else [given]
         return [name for name in names if not name.startswith(CLASS)]
@@ -86,7 +86,7 @@ class Comparison:
     left : Selection
     right : Selection or float
     margin : float
-        Of `>` and `<`: the difference must be larger than this; of `similar`: smaller.
+        For `>` and `<`, the difference must be larger than this; for `similar`, smaller.
     match : tuple of str
         Columns that must agree between the two rows compared.
     """
@@ -99,7 +99,7 @@ class Comparison:
 
     @property
     def claimed(self) -> tuple[float, float]:
-        """Between which bounds the difference left - right is claimed to lie."""
+        """Bounds of the claimed difference left - right."""
         above, below = (self.margin, math.inf), (-math.inf, -self.margin)
         return {">": above, "<": below, "similar": (-self.margin, self.margin)}[self.relation]
 
@@ -116,11 +116,11 @@ class Claim:
     Attributes
     ----------
     id, section, text : str
-        Where the paper makes it, and what it says in our words.
+        Section of the paper, and the claim in our words.
     statement : str
-        What the tests ask, for readers.
+        What the tests check, for readers.
     paper : str
-        The paper's value, "" where it gives none.
+        The paper's value, "" if it gives none.
     unit : str
         Of the quantities that the evidence shows.
     tests : tuple of Comparison
@@ -129,11 +129,11 @@ class Claim:
         "", or one of `ONLY_ON`. "photographs": the claim is about these, and nothing rendered can test it.
         "rendered people": its tables hold nothing else, whatever data the run was given.
     reason : str
-        For what no result can test here: why not.
+        For a claim that no result can test here: the reason.
     class_statement : str
         The same about the class the named systems belong to, for readers; "" for none.
     class_tests : tuple of Comparison
-        What that asks.
+        Its tests.
     """
 
     id: str
@@ -164,7 +164,7 @@ def read_claims(path: Path = CLAIMS_FILE) -> list[Claim]:
     Raises
     ------
     InputError
-        Naming the claim and what is wrong with it.
+        Names the claim and what is wrong with it.
 
     Examples
     --------

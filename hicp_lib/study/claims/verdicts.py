@@ -1,12 +1,12 @@
-"""Verdicts: what a run's result files say about each claim.
+"""Verdicts on claims, from a run's result files.
 
 A test *holds* when the whole interval of the difference lies on the claimed side, *fails* when none of it
-does, and is *open* otherwise, or where there is no interval (NaN). Two are similar when the whole interval
-lies within the margin: two one-sided tests. Tables of differences come with intervals of their own, from
-paired draws; the difference of two rows with an interval each takes the widest: that asks for more than a
-paired comparison would, never for less. A claim that makes k comparisons takes each at 1 - .05 / k
-(Bonferroni), so that with 95 % all of them are told right, whether they hold or fail: the half-widths of the
-95 % intervals grow as those of a normal distribution do.
+does, and is *open* otherwise, or without an interval (NaN). Two quantities are similar when the whole
+interval lies within the margin: two one-sided tests. Tables of differences have their own intervals, from
+paired resamples; for the difference of two rows with separate intervals the widest possible one is used,
+which is never less strict than a paired comparison. With k comparisons in a claim, each uses a level of 1 -
+.05 / k (Bonferroni), so that all are correct with 95 %, whether they hold or fail: the half-widths of the 95
+% intervals are scaled as for a normal distribution.
 """
 
 import math
@@ -47,9 +47,9 @@ class Verdict:
     reason : str
         Why the claim was not tested, or not decided.
     n_comparisons : int
-        How many the claim made.
+        Number of comparisons in the claim.
     of_class : Verdict or None
-        What the run says of the class that the claim's systems belong to; no part of the verdict.
+        The result for the class of the claim's systems; not part of the verdict.
     """
 
     claim: Claim
@@ -75,19 +75,19 @@ class Pair:
     right: Quantity
 
     def interval(self, n_comparisons: int = 1) -> tuple[float, float]:
-        """Of the difference, when it is one of so many."""
+        """The interval of the difference, for this number of comparisons."""
         value = self.left.value - self.right.value
         grows = NormalDist().inv_cdf(1 - 0.025 / n_comparisons) / _SURE
         low, high = self.left.low - self.right.high, self.left.high - self.right.low
         return value - grows * (value - low), value + grows * (high - value)
 
     def slack(self, n_comparisons: int = 1) -> tuple[float, float]:
-        """How far the interval's worse and better end are within what is claimed; below 0 outside."""
+        """Distances of the interval's worse and better end within the claimed bounds; below 0 outside."""
         (low, high), (above, below) = self.interval(n_comparisons), self.test.claimed
         return float(np.minimum(low - above, below - high)), float(np.minimum(high - above, below - low))
 
     def outcome(self, n_comparisons: int = 1) -> bool | None:
-        """Whether it holds; None when that is open.
+        """Whether it holds; None if open.
 
         Examples
         --------
@@ -119,7 +119,7 @@ def judge_claims(claims: list[Claim], results: Path) -> list[Verdict]:
     Raises
     ------
     InputError
-        If a claim asks for a column that its table does not have.
+        If a table lacks a column of a claim.
     """
     beyond = [_judge(replace(of, tests=of.class_tests), results) if of.class_tests else None for of in claims]
     own = (_judge(claim, results) for claim in claims)
@@ -158,7 +158,7 @@ def _saw_rendered(claim: Claim, results: Path) -> bool:
 
 
 def _compared(claim: Claim, results: Path) -> tuple[list[Pair], list[str]]:
-    """What the tests of a claim compare, and the systems they name that were not run."""
+    """The comparisons of a claim's tests, and the named systems that were not run."""
     pairs, absent = list[Pair](), dict[str, None]()
     for test in claim.tests:
         (left, absent_left), (right, absent_right) = select(test.left, results), select(test.right, results)
@@ -181,7 +181,7 @@ def _decide(claim: Claim, pairs: list[Pair], rendered: bool) -> Verdict:
     said = Verdict(claim, verdict[decided], _evidence(claim, pairs, decisive), n_comparisons=n)
     if decided is not None:
         return said
-    half = float(np.max([np.ptp(pair.interval(n)) / 2 for pair in decisive]))  # NaN where one has none
+    half = float(np.max([np.ptp(pair.interval(n)) / 2 for pair in decisive]))  # NaN if one has none
     reason = f"the least difference that this run could have seen is {half:.2g} {claim.unit}".strip()
     if math.isnan(half):
         reason = "too few images for an interval, or nothing found"

@@ -103,7 +103,7 @@ def test_the_transform_is_printed_and_may_be_given(capsys, model):
     show = ["models", "show", "--detector", "mmpose", "--model", model]
     for options, expected in (
         ([], r"classic, not UDP +ASSUMED"),
-        (["-o", "udp", "true"], "UDP: sizes less one"),
+        (["-o", "udp", "true"], "UDP: sizes minus one"),
     ):
         assert cli.run([*show, *options]) == 0
         assert re.search(f"transform +{expected}", capsys.readouterr().out)

@@ -232,13 +232,13 @@ def test_udp_is_told_by_the_file_where_it_can_be_and_named_where_not(tmp_path):
     assert transform(plain, udp=True) == ("UDP", "option udp")
     assert transform(told(udp_model(tmp_path / "a.onnx", True), udp="true")) == (
         "UDP",
-        "told by its metadata",
+        "from its metadata",
     )
     assert transform(tmp_path / "a.onnx", udp=False) == ("cla", "option udp")
     patches = patch_model(tmp_path / "vit.onnx")
     assert transform(patches)[0] == "UDP" and "patches of 16 pixels" in transform(patches)[1]
     simcc = colour_simcc_model(tmp_path / "simcc.onnx", SIZE, 17)
-    assert transform(simcc) == ("cla", "told by the outputs")
+    assert transform(simcc) == ("cla", "from the outputs")
     for model, options in ((simcc, {"udp": True}), (plain, {"udp": True, "dark": False})):
         with pytest.raises(InputError, match="UDP is for heat maps decoded by DARK"):
             MMPose(model, **options)
@@ -303,7 +303,7 @@ def test_an_open_input_is_asked_for_or_told_by_metadata(tmp_path):
     )
     told(model, cigpose_meta='{"input_w": 96, "input_h": 128, "split_ratio": 2.0, "num_keypoints": 17}')
     np.testing.assert_array_equal(MMPose(model).detect(image).keypoints_px, fixed.keypoints_px)
-    with pytest.raises(InputError, match=r"96 x 128 \(told by its metadata\), not 192 x 256"):
+    with pytest.raises(InputError, match=r"96 x 128 \(from its metadata\), not 192 x 256"):
         MMPose(model, input_size_px=[192, 256])
     with pytest.raises(InputError, match="not 192 x 256"):
         MMPose(tmp_path / "fixed.onnx", input_size_px=[192, 256])

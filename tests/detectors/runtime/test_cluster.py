@@ -181,7 +181,7 @@ def test_what_workers_cannot_do_and_that_they_are_gone_is_said_in_one_line(slow,
         monkeypatch.setattr(run, "write_result", write_and_lose)
         line = refusal(address, registered)
         assert line.startswith(f"{address}: the Dask cluster is gone (it has lost its workers)")
-        assert line.endswith("run the same command again to go on") and slow.n_kept() == 20
+        assert line.endswith("run the same command again to continue") and slow.n_kept() == 20
 
 
 def test_a_fault_of_a_detector_is_told_as_what_it_is(slow, registered):
@@ -226,7 +226,7 @@ def test_other_errors_are_not_taken_for_a_lost_cluster():
 def test_what_dask_cannot_run_is_another_environment(error):
     told = cluster._not_run(error, "a.png")
     assert str(told) == (
-        "the Dask cluster cannot run what it is asked to (no slow_detector); "
+        "the Dask cluster cannot run its jobs (no slow_detector); "
         "install the same environment and weights on scheduler and workers"
     )
 
@@ -237,7 +237,7 @@ def test_an_image_that_kills_its_workers_is_named(slow, registered):
     environment = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
     with dask_cluster(slow, ({},), *PRELOAD, **environment) as (address, _):
         line = refusal(address, {"deadly": deadly})
-    assert line.startswith(f"{deadly}: every worker that took it died, lately tcp://127.0.0.1:")
+    assert line.startswith(f"{deadly}: every worker that ran it died, most recently tcp://127.0.0.1:")
 
 
 def test_the_command_line_tells_of_a_lost_scheduler_in_one_line(slow):
@@ -253,7 +253,7 @@ def test_the_command_line_tells_of_a_lost_scheduler_in_one_line(slow):
     assert (client.returncode, output) == (2, "")
     assert errors.startswith(f"hicp: {address}: the Dask cluster is gone ("), errors
     assert errors.count("\n") == 1, errors
-    assert errors.endswith("run the same command again to go on\n")
+    assert errors.endswith("run the same command again to continue\n")
     assert slow.n_kept() == 4 and not (slow.folder / "out.json").exists()
 
 

@@ -184,7 +184,7 @@ def test_one_flipped_bit_in_an_archive_of_unknown_hash_fails_its_checksum(server
     damaged = bytearray(server.files["/a/net.zip"])
     damaged[60] ^= 1
     server.files["/a/net.zip"] = bytes(damaged)
-    refused("net", "not a sound zip archive")
+    refused("net", "not an intact zip archive")
 
 
 def test_nothing_is_written_beside_the_registry(server, tmp_path):
@@ -304,13 +304,13 @@ def test_an_archive_that_lies_about_its_size_is_refused(server):
     honest = zipped(("end2end.onnx", bytes(100_000)))
     server.files["/a/net.zip"] = honest.replace((100_000).to_bytes(4, "little"), (10).to_bytes(4, "little"))
     assert server.files["/a/net.zip"] != honest
-    refused("net", "not a sound zip archive")
+    refused("net", "not an intact zip archive")
 
 
 @pytest.mark.parametrize("content", [b"x", b"PK\x03\x04 no archive", zipped(("end2end.onnx", CONTENT))[:-9]])
 def test_what_is_no_archive_is_refused(server, content):
     server.files["/a/net.zip"] = content
-    refused("net", "not a sound zip archive")
+    refused("net", "not an intact zip archive")
 
 
 def test_an_address_that_is_gone_says_where_to_put_the_file(server):
