@@ -13,7 +13,7 @@ from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS
 from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import PERFECT, TRUTH_COLOUR, detector_colour, detector_marker
-from hicp_lib.study.plots.style import COLUMN_IN, TEXTS, Figure, in_style, in_words, new_figure, texts
+from hicp_lib.study.plots.style import COLUMN_IN, TEXTS, Figure, in_style, new_figure, texts
 from hicp_lib.study.table_format import in_cm
 
 _MOST_M = 0.1  # residuals beyond it are drawn on the border
@@ -41,17 +41,16 @@ def joint_medians(medians: pd.DataFrame, paper: pd.DataFrame, min_score: float, 
     theirs = paper.assign(detector=paper["detector"] + _OF_PAPER, method="paper")
     table = pd.concat([medians, theirs], ignore_index=True)
     table = table[(table["min_score"] == min_score) & table["keypoint"].isin(TABLE_JOINTS)]
-    table = table[["detector", "method", "keypoint", "count", "median_m", "low_m", "high_m"]]
-    table["joint"] = table["keypoint"].str.replace("_", " ")
+    table = table[["detector", "method", "keypoint", "count", *_BOUNDS]]
+    table = table.assign(joint=table["keypoint"].str.replace("_", " "))
     names = list(table["detector"].unique())
     n_ours = sum(not name.endswith(_OF_PAPER) for name in names)
     size = COLUMN_IN, 1.2 + 0.6 * len(names)
     figure, axes, panels = marks.panels(table, ["joint"], *size, wrap=2, sharex=True, sharey=True)
     for axis, rows, joint in panels:
         for (detector, method), dot in rows.groupby(["detector", "method"], sort=False):
-            pen = marks.detector_dots([detector.removesuffix(_OF_PAPER)])
-            (pen,) = pen.values()
-            pen |= {"label": None, "ms": 6} | ({"mfc": "white"} if method != "paper" else {})
+            (pen,) = marks.detector_dots([detector.removesuffix(_OF_PAPER)]).values()
+            pen |= {"label": None, "ms": 6} | ({} if method == "paper" else {"mfc": "white"})
             marks.dots(axis, dot, names.index(detector), _BOUNDS, 100, **pen)
             if (detector, method) == (PERFECT, "paper"):
                 axis.axvline(100 * dot["median_m"].iloc[0], color=TRUTH_COLOUR, lw=0.8, ls=":")
@@ -152,14 +151,13 @@ def error_budget(budget: pd.DataFrame, view: str, paper: pd.DataFrame, note: str
         axis.axvline(0, color="#888888", lw=0.8)
     axes[0, 0].set(yticks=[*rows.values()], yticklabels=[*rows], ylim=(max(rows.values()) + 0.6, -0.6))
     marks.legend_below(figure, axes, ncols=2)
-    named = in_words(paper["detector"].unique())
-    theirs = f", against motion capture beside the medians of the paper's {named}"
-    beside = theirs if AGAINST_MOCAP in rows else ""
+    beside = ", against motion capture beside the paper's best medians" if AGAINST_MOCAP in rows else ""
     first = table[table["kind"] == "alone"].sort_values("value_m", ascending=False)
     first = first.drop_duplicates(["part", "method"]).set_index(["part", "method", "source"])["value_m"]
     least_m = table.loc[table["kind"] == "gain", "detectable_m"].median()
     told = {"n_people": table["n_people"].max(), "beside": beside, "note": note, "said": 100 * first}
-    told |= {"view": view, "least": in_cm([least_m])[0]}
+    top = first.groupby(level="method", sort=False).head(1)
+    told |= {"view": view, "least": in_cm([least_m])[0], "top": 100 * top}
     return Figure(figure, *texts("error_budget", **told), budget)
 
 

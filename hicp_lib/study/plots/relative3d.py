@@ -144,16 +144,9 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
         axis.axline((1, 1), (2, 2), color="#888888", lw=1, ls="--")
         axis.label_outer()
     marks.legend_below(figure, axes, ncols=2)
-    worse = rows.assign(mostly=np.where(rows["bias_m"] > rows["spread_m"], "bias", "spread"))
-    counts = worse.groupby(["detector", "mostly"], sort=False).size()
-    told = {
-        "n_bias": (worse["mostly"] == "bias").sum(),
-        "n": len(worse),
-        "method": method,
-        "filled": views[0],
-    }
-    told |= {"intervals": intervals_over(rows), "note": note}
-    return Figure(figure, *texts("spread_against_bias", **told, said=counts), table)
+    n_bias, n = (rows["bias_m"] > rows["spread_m"]).sum(), len(rows)
+    told = {"method": method, "filled": views[0], "intervals": intervals_over(rows), "note": note}
+    return Figure(figure, *texts("spread_against_bias", **told, n_bias=n_bias, n=n), table)
 
 
 BODY_LIMBS = [limb for limb in LIMBS if limb[0] not in HANDS]
