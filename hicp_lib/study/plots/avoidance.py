@@ -7,12 +7,11 @@ import pandas as pd
 
 from hicp_lib.experiments.avoidance.runs import IDEAL, NO_AVOIDANCE
 from hicp_lib.robot.separation import Separation, separation_table
-from hicp_lib.study.avoidance import MARKS_M, UNTIL, clearance, over_people
+from hicp_lib.study.avoidance import FIELD_M, MARKS_M, UNTIL, clearance, over_people
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
-from hicp_lib.study.plots.style import Figure, in_lines, in_style, new_figure, texts
+from hicp_lib.study.plots.style import COLUMN_IN, Figure, in_style, new_figure, texts
 
-_TERM_COLOURS = ("#0072B2", "#E69F00", "#D55E00", "#999999", "#009E73", "#CC79A7")
 _GAINS = {"ours": "-", "published": "--"}
 _SCRIPT_MARKERS = "os^Dv"
 
@@ -36,7 +35,7 @@ def clearances(metrics: pd.DataFrame, note: str) -> Figure:
     table, cases = clearance(metrics), metrics.groupby(["detector", "gains"], sort=False)
     conditions = [detector + f", {gains}" * (detector != NO_AVOIDANCE) for (detector, gains), _ in cases]
     height_in = 1.6 + 0.42 * len(conditions)
-    figure, axes, panels = marks.panels(table, ["until"], 10.0, height_in, sharey=True, sharex=True)
+    figure, axes, panels = marks.panels(table, ["until"], COLUMN_IN, height_in, sharey=True, sharex=True)
     bar: dict[str, Any] = {"fmt": "|", "ms": 12, "mew": 2.5, "capsize": 0, "elinewidth": 2}
     for axis, means, until in panels:
         for place, ((detector, _), mine) in enumerate(cases):
@@ -52,7 +51,8 @@ def clearances(metrics: pd.DataFrame, note: str) -> Figure:
     marks.name_rows(axes[0, 0], conditions)
     marks.legend_below(figure, axes[0, 0])
     said = [f"{name} {100 * value:.1f}" for name, value in zip(conditions, table["value"], strict=False)]
-    return Figure(figure, *texts("clearances", note=note, means=said), table)
+    best = said[int(table["value"][: len(said)].argmax())] + " cm"
+    return Figure(figure, *texts("clearances", note=note, means=said, best=best), table)
 
 
 @in_style
@@ -71,7 +71,7 @@ def sweep_curves(sweeps: Mapping[str, pd.DataFrame], note: str) -> Figure:
     case = ["detector", "gains"]
     tables = {of: over_people(rows, [*case, of], "min_distance_m") for of, rows in sweeps.items()}
     table = pd.concat(tables, names=["swept"]).reset_index(level=0)
-    figure, axes, panels = marks.panels(table, ["swept"], 4.2 * len(sweeps), 4.2, sharey=True)
+    figure, axes, panels = marks.panels(table, ["swept"], COLUMN_IN, 6.4, wrap=2, sharey=True)
     for axis, of_column, column in panels:
         label, factor = labels[column]
         for (detector, gains), rows in of_column.groupby(case, sort=False):
@@ -82,7 +82,8 @@ def sweep_curves(sweeps: Mapping[str, pd.DataFrame], note: str) -> Figure:
         for mark_m in MARKS_M:
             axis.axhline(100 * mark_m, color="#888888", lw=1, ls=":")
         axis.set_xlabel(label)
-    axes[0, 0].set(ylabel="least distance (cm)", ylim=(0, None))
+    for axis in axes[:, 0]:
+        axis.set(ylabel="least distance (cm)", ylim=(0, None))
     marks.legend_below(figure, axes, ncols=2)
     lines = table.assign(cm=100 * table["value"]).groupby(["swept", *case], sort=False)["cm"]
     ends = lines.agg(["first", "last"]).reset_index()
@@ -91,15 +92,19 @@ def sweep_curves(sweeps: Mapping[str, pd.DataFrame], note: str) -> Figure:
 
 @in_style
 def separation_terms(separations: Mapping[str, Separation], note: str) -> Figure:
-    """The terms of the protective separation distance as stacked bars, one per detector."""
-    figure, axis = new_figure(1, 1, 8.0, 1.2 + 0.6 * len(separations))
+    """The terms of the protective separation distance and their sum: a row each, a dot per detector."""
     table = separation_table(separations)
-    terms_cm = 100 * table.set_index("term").drop("sum")
-    terms_cm.T.plot.barh(stacked=True, ax=axis, color=_TERM_COLOURS, width=0.8, legend=False)
-    axis.bar_label(axis.containers[-1], [f"{sum_cm:.0f} cm" for sum_cm in terms_cm.sum()], padding=4)
-    figure.legend(loc="outside lower center", ncols=2)
-    axis.set_yticks(range(len(separations)), list(map(in_lines, separations)))
-    axis.set_xlabel("protective separation distance (cm)")
-    axis.margins(x=0.12)
+    rows = table.melt("term", var_name="detector", value_name="value")
+    rows = rows.assign(low=rows["value"], high=rows["value"])
+    figure, axis = new_figure(1, 1, COLUMN_IN, 1.4 + 0.36 * len(table))
+    pens, terms = marks.detector_dots(separations), list(table["term"])
+    marks.dots_in_rows(axis, rows, "term", "detector", terms, pens, factor=100, ms=6, capsize=0)
+    marks.name_rows(axis, terms)
+    axis.axhline(len(terms) - 1.5, color="#AAAAAA", lw=0.8)
+    axis.axvline(100 * FIELD_M, color="#111111", lw=1, ls=":")
+    axis.set(xlabel="share of the protective separation distance (cm)", xlim=(0, None))
+    marks.legend_below(figure, axis, ncols=2)
     sums = [f"{name} {100 * separation.distance_m:.0f} cm" for name, separation in separations.items()]
-    return Figure(figure, *texts("separation_terms", note=note, sums=sums), table)
+    largest = rows[rows["term"] != "sum"].sort_values("value").drop_duplicates("detector", keep="last")
+    told = {"note": note, "sums": sums, "field_cm": 100 * FIELD_M, "largest": largest}
+    return Figure(figure, *texts("separation_terms", **told), table)

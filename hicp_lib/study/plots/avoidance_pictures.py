@@ -27,7 +27,7 @@ from hicp_lib.simulation.rendering.camera import project_world
 from hicp_lib.study.avoidance import SURE, sure_keypoints
 from hicp_lib.study.plots.avoidance import condition_colour
 from hicp_lib.study.plots.people import picture_grid
-from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
+from hicp_lib.study.plots.style import COLUMN_IN, Figure, in_style, new_figure, texts
 
 _THREATENED = 0.05  # activation from which a taxel is drawn
 _MOST = 0.5  # activation of the darkest
@@ -46,7 +46,7 @@ def filmstrip(run: Run, times_s: Sequence[float], note: str) -> Figure:
     note : str
         What the data are, for the caption.
     """
-    figure, axes = new_figure(2, len(times_s), 3.0 * len(times_s), 4.9, squeeze=False)
+    figure, axes = new_figure(2, len(times_s), COLUMN_IN, 0.9 + 9.6 / len(times_s), squeeze=False)
     for (above, below), time_s in zip(axes.T, times_s, strict=True):
         _draw_moment(above, below, run, time_s)
     told = {"script": run.job.trial.script, "condition": run.job.condition, "n": len(times_s), "note": note}
@@ -74,7 +74,7 @@ def nearest_views(runs: Sequence[Run], note: str) -> Figure:
         *texts("nearest_views", scripts=list(shown), detectors=detectors, min_score=SURE, note=note),
         row_titles=list(shown),
         titles=detectors,
-        cell_in=min(3.2, 11 / max(len(detectors), 1)),
+        cell_in=COLUMN_IN / max(len(detectors), 2),
     )
 
 
@@ -132,7 +132,7 @@ def _draw_moment(camera, space, run: Run, time_s: float) -> None:
     if frame is not None:
         camera.imshow(_drawn(run, frame))
     _draw_space(space, run, cycle, frame)
-    space.set_title(f"{100 * cycle['distance_m']:.0f} cm, activation {cycle['activation']:.2f}")
+    space.set_title(f"{100 * cycle['distance_m']:.0f} cm, a = {cycle['activation']:.2f}")
 
 
 def _drawn(run: Run, frame: pd.Series) -> np.ndarray:

@@ -5,7 +5,7 @@ import pandas as pd
 from hicp_lib.core.errors import InputError
 from hicp_lib.study.claims.verdicts import VERDICTS
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
+from hicp_lib.study.plots.style import COLUMN_IN, Figure, in_style, new_figure, texts
 
 # By `VERDICTS`: Okabe and Ito's palette; the hatch says the same without colour.
 _COLOURS = ("#009E73", "#56B4E9", "#D55E00", "#F0E442", "#CC79A7", "#D9D9D9")
@@ -32,11 +32,11 @@ def _by_section(table: pd.DataFrame) -> Figure:
     sections = list(dict.fromkeys(table["section"]))
     counts = table.groupby(["section", "verdict"], sort=False).size().unstack(fill_value=0)
     counts = counts.reindex(index=sections, columns=VERDICTS, fill_value=0)
-    figure, axis = new_figure(1, 1, 8.0, 1.4 + 0.32 * len(sections))
+    figure, axis = new_figure(1, 1, COLUMN_IN, 1.5 + 0.32 * len(sections))
     marks.stacked_bars(axis, counts, _FILLS)
     axis.set(yticks=range(len(sections)), yticklabels=sections)
     axis.invert_yaxis()
     axis.set(xlabel="claims", ylabel="section of the paper", xticks=range(int(counts.sum(axis=1).max()) + 1))
-    figure.legend(loc="outside upper center", ncols=3)
+    figure.legend(loc="outside upper center", ncols=2)
     numbers = counts.reset_index().melt("section", var_name="verdict", value_name="claims")
     return Figure(figure, *texts("verdicts", counts=counts.sum()), numbers)

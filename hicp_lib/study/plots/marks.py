@@ -49,7 +49,9 @@ def add_keys(axis, detectors: Iterable[str], others: Mapping[str, dict[str, Any]
         axis.plot([], [], **{"color": _NO_DETECTOR, "label": name} | style)
 
 
-def panels(table: pd.DataFrame, by: Sequence[str], width_in: float, height_in: float, **shared: Any):
+def panels(
+    table: pd.DataFrame, by: Sequence[str], width_in: float, height_in: float, wrap: int = 99, **shared: Any
+):
     """A figure with a panel for each value of a column (across), or of two (down, across).
 
     Parameters
@@ -59,6 +61,8 @@ def panels(table: pd.DataFrame, by: Sequence[str], width_in: float, height_in: f
         Columns of the table; their values in the order they come in.
     width_in, height_in : float
         The figure's size in inches.
+    wrap : int
+        Panels in a row, at most; those of two columns are not wrapped.
     **shared : any
         Further options of `new_figure`.
 
@@ -72,9 +76,13 @@ def panels(table: pd.DataFrame, by: Sequence[str], width_in: float, height_in: f
     """
     values = [table[name].unique() for name in by]
     n_rows, n_columns = [1, *(max(len(of), 1) for of in values)][-2:]
+    if n_rows == 1:
+        n_rows, n_columns = -(-n_columns // wrap), min(n_columns, wrap)
     figure, axes = new_figure(n_rows, n_columns, width_in, height_in, squeeze=False, **shared)
     cases = zip(axes.flat, itertools.product(*values), strict=False)
     found = [(axis, table[(table[list(by)] == list(case)).all(axis=1)], *case) for axis, case in cases]
+    for axis in axes.flat[len(found) or 1 :]:
+        axis.set_axis_off()
     return figure, axes, found
 
 

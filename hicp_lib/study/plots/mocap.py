@@ -1,4 +1,4 @@
-"""Figures of the test against motion capture: distributions, trajectories, the budget of the errors.
+"""Figures of the test against motion capture: medians, residuals, the budget of the errors.
 
 Tables are those of `hicp_lib.evaluation.space.mocap_error` and `hicp_lib.evaluation.space.error_budget`. A
 detector called `palette.PERFECT` among them is the floor: what the true keypoints in the image come to.
@@ -12,24 +12,25 @@ from hicp_lib.evaluation.space.error_budget import AGAINST_MOCAP, TOTALS
 from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS
 from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import PERFECT, TRUTH_COLOUR, detector_colour
-from hicp_lib.study.plots.style import TEXTS, Figure, in_style, in_words, new_figure, texts
+from hicp_lib.study.plots.palette import PERFECT, TRUTH_COLOUR, detector_colour, detector_marker
+from hicp_lib.study.plots.style import COLUMN_IN, TEXTS, Figure, in_style, new_figure, texts
+from hicp_lib.study.table_format import in_cm
 
-_OUT_OF_RANGE_M = 0.15  # beyond the reference's range by more is not drawn
-_BOX_CM = (1, 3, 10, 30, 100)  # ticks of a logarithmic axis
-_LINE = ["detector", "method", "keypoint"]
-_AXES = {"x_m": "x (backward) [m]", "y_m": "y (right) [m]", "z_m": "z (up) [m]"}
+_MOST_M = 0.1  # residuals beyond it are drawn on the border
+_OF_PAPER = " (paper)"
+_BOUNDS = ("median_m", "low_m", "high_m")
+_AXES = {"x_m": "x, backward [cm]", "y_m": "y, to the right [cm]", "z_m": "z, up [cm]"}
 
 
 @in_style
-def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: float, note: str) -> Figure:
-    """Distances from the markers per joint and detector, like with like: first by the paper's lifting, beside
-    the medians the paper reports, then by the others.
+def joint_medians(medians: pd.DataFrame, paper: pd.DataFrame, min_score: float, note: str) -> Figure:
+    """Median distances from the markers per joint, like with like: ours by the paper's lifting (filled) above
+    the paper's own; hollow: ours by the robust lifting.
 
     Parameters
     ----------
-    errors : pd.DataFrame
-        As from `hicp_lib.evaluation.space.mocap_error.mocap_errors`.
+    medians : pd.DataFrame
+        As from `hicp_lib.evaluation.space.mocap_error.median_errors`.
     paper : pd.DataFrame
         As from `hicp_lib.study.paper_tables.paper_medians`.
     min_score : float
@@ -37,38 +38,34 @@ def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: fl
     note : str
         What the data are, for the caption.
     """
-    words, is_found = errors["keypoint"].str.split("_").str, errors["score"] > min_score
-    is_found &= errors["error_m"].notna()
-    errors = errors.assign(side=words[0], part=words[1], is_found=is_found)
-    at_arms = errors[errors["keypoint"].isin(TABLE_JOINTS)]
-    cases = errors[_LINE[:2]].drop_duplicates().sort_values("method", kind="stable")  # the paper's first
-    names = [f"{detector}, {method} lifting" for detector, method in cases.itertuples(index=False)]
-    named, n_like = list(paper["detector"].unique()), (cases["method"] == "paper").sum()
-    paper = paper[paper["min_score"] == min_score].set_index(["detector", "keypoint"]).sort_index()
-    labels = [*names[:n_like], *(f"{name} (paper)" for name in named), *names[n_like:]]
-    width_in = max(4.6 * at_arms["part"].nunique(), 6.0)
-    height_in = 0.6 + (0.9 + 0.24 * len(labels)) * at_arms["side"].nunique()
-    shared = {"sharex": True, "sharey": True}
-    figure, _, panels = marks.panels(at_arms, ["side", "part"], width_in, height_in, **shared)
-    for axis, rows, side, part in panels:
-        for (detector, method), errors_m in rows[rows["is_found"]].groupby(_LINE[:2])["error_m"]:
-            y = labels.index(f"{detector}, {method} lifting")
-            place = {"positions": [y], "widths": 0.6, "manage_ticks": False}
-            marks.draw_boxes(axis, [100 * errors_m], [detector_colour(detector)], **place)
+    theirs = paper.assign(detector=paper["detector"] + _OF_PAPER, method="paper")
+    table = pd.concat([medians, theirs], ignore_index=True)
+    table = table[(table["min_score"] == min_score) & table["keypoint"].isin(TABLE_JOINTS)]
+    table = table[["detector", "method", "keypoint", "count", *_BOUNDS]]
+    table = table.assign(joint=table["keypoint"].str.replace("_", " "))
+    names = list(table["detector"].unique())
+    n_ours = sum(not name.endswith(_OF_PAPER) for name in names)
+    size = COLUMN_IN, 1.2 + 0.6 * len(names)
+    figure, axes, panels = marks.panels(table, ["joint"], *size, wrap=2, sharex=True, sharey=True)
+    for axis, rows, joint in panels:
+        for (detector, method), dot in rows.groupby(["detector", "method"], sort=False):
+            (pen,) = marks.detector_dots([detector.removesuffix(_OF_PAPER)]).values()
+            pen |= {"label": None, "ms": 6} | ({} if method == "paper" else {"mfc": "white"})
+            marks.dots(axis, dot, names.index(detector), _BOUNDS, 100, **pen)
             if (detector, method) == (PERFECT, "paper"):
-                axis.axvline(100 * errors_m.median(), color=TRUTH_COLOUR, lw=0.8, ls=":")
-        for y, detector in enumerate(named, start=n_like):
-            median_m = paper.at[(detector, f"{side}_{part}"), "median_m"]
-            axis.plot(100 * median_m, y, "D", color=detector_colour(detector), markersize=7)
-        axis.hlines([n_like - 0.5, n_like + len(named) - 0.5], 0.3, 100, color="#AAAAAA", lw=0.8)
-        axis.set(xscale="log", xlim=(0.3, 100), xlabel="distance [cm]", title=f"{side} {part}")
-        axis.set(xticks=_BOX_CM, xticklabels=map(str, _BOX_CM))
-        marks.name_rows(axis, labels)
+                axis.axvline(100 * dot["median_m"].iloc[0], color=TRUTH_COLOUR, lw=0.8, ls=":")
+        axis.axhline(n_ours - 0.5, color="#AAAAAA", lw=0.8)
+        axis.set(xlabel="median distance [cm]", title=joint, xlim=(0, None))
+        marks.name_rows(axis, names)
         axis.label_outer()
-    medians_cm = 100 * at_arms[at_arms["is_found"]].groupby(_LINE[:2], sort=False)["error_m"].median()
-    told = {"min_score": min_score, "note": note, "floor": _floor(errors)}
-    said = texts("error_distributions", **told, said=medians_cm)
-    return Figure(figure, *said, errors.loc[is_found, [*_LINE, "frame", "score", "error_m"]])
+    fills = {"the paper's lifting": {}, "robust lifting": {"mfc": "white"}}
+    marks.add_keys(axes[0, 0], (), {name: {"marker": "o", "ls": ""} | fill for name, fill in fills.items()})
+    marks.legend_below(figure, axes[0, 0])
+    by_paper = table[table["method"] == "paper"].groupby("detector", sort=False)["median_m"]
+    ends_cm = (100 * by_paper.agg(["min", "max"])).dropna().reset_index()
+    told = {"min_score": min_score, "note": note, "floor": _floor(medians), "ends": ends_cm}
+    told["means"] = 100 * by_paper.mean().dropna()
+    return Figure(figure, *texts("joint_medians", **told), table.drop(columns="joint"))
 
 
 def _floor(table: pd.DataFrame) -> str:
@@ -76,10 +73,10 @@ def _floor(table: pd.DataFrame) -> str:
 
 
 @in_style
-def trajectories(
+def residuals(
     errors: pd.DataFrame, times_s: np.ndarray, keypoint: str, min_score: float, note: str
 ) -> Figure:
-    """Coordinates of one joint over time: motion capture as a line with its gaps, what was lifted as dots.
+    """What was lifted of one joint less where motion capture had it, over time: a panel per coordinate.
 
     Parameters
     ----------
@@ -95,58 +92,56 @@ def trajectories(
         What the data are, for the caption.
     """
     errors = errors[errors["keypoint"] == keypoint]
-    found = errors[errors["score"] > min_score]
-    first = errors[errors["detector"] == errors["detector"].iloc[0]].sort_values("frame")
-    figure, axes = new_figure(3, 1, 10.0, 6.4, sharex=True)
+    found = errors[(errors["score"] > min_score) & errors["error_m"].notna()]
+    figure, axes = new_figure(3, 1, COLUMN_IN, 6.2, sharex=True, sharey=True)
     for axis, (column, label) in zip(axes, _AXES.items(), strict=True):
-        line = first[f"reference_{column}"].to_numpy()
-        elapsed_s = times_s[first["frame"]] - times_s[0]
-        axis.plot(elapsed_s, line, color=TRUTH_COLOUR, lw=1.6, label="motion capture")
         for detector in sorted(errors["detector"].unique(), key=PERFECT.__ne__):  # beneath the others
             dots = found[found["detector"] == detector]
-            pen = {"color": detector_colour(detector), "markersize": 4, "alpha": 0.8, "label": detector}
-            axis.plot(times_s[dots["frame"]] - times_s[0], dots[column], ".", **pen)
-        low, high = np.nanmin(line, initial=np.inf), np.nanmax(line, initial=-np.inf)
-        if np.isfinite([low, high]).all():
-            axis.set(ylim=(low - _OUT_OF_RANGE_M, high + _OUT_OF_RANGE_M))
-        axis.set(ylabel=label)
+            off_cm = 100 * (dots[column] - dots[f"reference_{column}"]).clip(-_MOST_M, _MOST_M)
+            pen = {"color": detector_colour(detector), "markersize": 4.5, "alpha": 0.8, "label": detector}
+            axis.plot(times_s[dots["frame"]] - times_s[0], off_cm, detector_marker(detector), **pen)
+        axis.axhline(0, color=TRUTH_COLOUR, lw=1)
+        axis.set(ylabel=label, ylim=(-104 * _MOST_M, 104 * _MOST_M))
     axes[-1].set(xlabel="time [s]")
-    marks.legend_below(figure, axes, ncols=5)
-    counts = found[found["error_m"].notna()].groupby("detector", sort=False).size()
-    told = {"min_score": min_score, "beyond_cm": 100 * _OUT_OF_RANGE_M, "floor": _floor(errors), "note": note}
+    marks.legend_below(figure, axes, ncols=2)
+    said = found.groupby("detector", sort=False)["error_m"].agg(["size", "median"]).reset_index()
+    said["median"] *= 100
+    told = {"min_score": min_score, "beyond_cm": 100 * _MOST_M, "floor": _floor(errors), "note": note}
     told |= {"name": keypoint.replace("_", " "), "methods": list(errors["method"].unique())}
-    said = texts("trajectories", **told, said=counts)
     columns = ["detector", "frame", *_AXES, *(f"reference_{c}" for c in _AXES), "score", "error_m"]
-    return Figure(figure, *said, errors[columns])
+    return Figure(figure, *texts("residuals", **told, said=said), errors[columns])
 
 
-_COLOURS = {"paper": "#D55E00", "robust": "#0072B2"}
-_HOLLOW = {"fmt": "D", "mfc": "white"}
+_PENS = {"paper": {"color": "#D55E00", "fmt": "s"}, "robust": {"color": "#0072B2", "fmt": "o"}}
 _TOTALS_APART = 0.5  # rows
 
 
 @in_style
-def error_budget(table: pd.DataFrame, paper: pd.DataFrame, note: str) -> Figure:
+def error_budget(budget: pd.DataFrame, view: str, paper: pd.DataFrame, note: str) -> Figure:
     """A panel per part, a row per source: its error alone (filled), and what is gained without it (hollow).
 
     Parameters
     ----------
-    table : pd.DataFrame
-        As from `hicp_lib.evaluation.space.error_budget.error_budget`, one view.
+    budget : pd.DataFrame
+        As from `hicp_lib.evaluation.space.error_budget.error_budget`.
+    view : str
+        Which of its views is drawn.
     paper : pd.DataFrame
         The paper's medians against motion capture, columns `detector, keypoint, median_m`.
     note : str
         What the data are, for the caption.
     """
+    table = budget[budget["view"] == view]
     sources, methods = (list(table[name].unique()) for name in ("source", "method"))
-    figure, axes, panels = marks.panels(table, ["part"], 11.5, 5.0, sharey=True)
+    size = COLUMN_IN, 1.2 + 0.68 * len(sources)
+    figure, axes, panels = marks.panels(table, ["part"], *size, wrap=2, sharey=True)
     rows = {source: k + _TOTALS_APART * (source not in TOTALS) for k, source in enumerate(sources)}
     for axis, of_part, part in panels:
         for (method, kind), of in of_part.groupby(["method", "kind"], sort=False):
             y = of["source"].map(rows) + marks.offset(methods.index(method), len(methods), 0.3)
             is_gain, bounds = kind == "gain", ("value_m", "low_m", "high_m")
             label = f"{method} lifting, {'gained without' if is_gain else 'alone'}"
-            pen = {"color": _COLOURS[method], "label": label} | (_HOLLOW if is_gain else {})
+            pen = _PENS[method] | {"label": label} | ({"mfc": "white"} if is_gain else {})
             marks.dots(axis, of, y, bounds, 100, **pen)
         if AGAINST_MOCAP in rows:
             theirs_cm = 100 * paper.loc[paper["keypoint"].str.endswith(part), "median_m"]
@@ -155,14 +150,15 @@ def error_budget(table: pd.DataFrame, paper: pd.DataFrame, note: str) -> Figure:
         axis.set(title=f"{part}s", xlabel="error, or gain [cm]")
         axis.axvline(0, color="#888888", lw=0.8)
     axes[0, 0].set(yticks=[*rows.values()], yticklabels=[*rows], ylim=(max(rows.values()) + 0.6, -0.6))
-    marks.legend_below(figure, axes, ncols=5)
-    named = in_words(paper["detector"].unique())
-    theirs = f", against motion capture beside the medians of the paper's {named}"
-    beside = theirs if AGAINST_MOCAP in rows else ""
+    marks.legend_below(figure, axes, ncols=2)
+    beside = ", against motion capture beside the paper's best medians" if AGAINST_MOCAP in rows else ""
     first = table[table["kind"] == "alone"].sort_values("value_m", ascending=False)
     first = first.drop_duplicates(["part", "method"]).set_index(["part", "method", "source"])["value_m"]
+    least_m = table.loc[table["kind"] == "gain", "detectable_m"].median()
     told = {"n_people": table["n_people"].max(), "beside": beside, "note": note, "said": 100 * first}
-    return Figure(figure, *texts("error_budget", **told), table)
+    top = first.groupby(level="method", sort=False).head(1)
+    told |= {"view": view, "least": in_cm([least_m])[0], "top": 100 * top}
+    return Figure(figure, *texts("error_budget", **told), budget)
 
 
 # Solutions in the order they are given; not detectors' colours.
@@ -192,14 +188,17 @@ def registration(
         What the data are, for the caption.
     """
     frames, methods = sorted(set(clicks["frame"])), list(table["method"])
-    figure, axes = new_figure(1, len(frames) + 1, 4.2 * len(frames) + 4.0, 4.4)
+    figure, axes = new_figure(2, len(frames), COLUMN_IN, 5.6, squeeze=False, height_ratios=(1.3, 1))
+    for axis in axes[1]:
+        axis.remove()
+    bars = figure.add_subplot(axes[1, 0].get_gridspec()[1, :])
     shown = clicks[["frame", "marker"]].merge(pixels, on=["frame", "marker"])
-    for axis, frame in zip(axes, frames, strict=False):
+    for axis, frame in zip(axes[0], frames, strict=True):
         _draw_markers(axis, recording, frame, clicks[clicks["frame"] == frame], shown, methods)
     known = bool(table["added_m"].notna().any())
     column, label = _ADDED if known else _LEAVE_ONE_OUT
-    _draw_bars(axes[-1], 1000 * table.set_index("method")[column], label)
-    marks.legend_below(figure, axes[0])
+    _draw_bars(bars, 1000 * table.set_index("method")[column], label)
+    marks.legend_below(figure, axes[0, 0], ncols=2)
     what = TEXTS["registration"]["known" if known else "unknown"]
     said = 1000 * table.set_index("method")[column].dropna()
     return Figure(figure, *texts("registration", what=what, note=note, said=said), table)

@@ -11,7 +11,7 @@ from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.inspection.skeletons import draw_people
 from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.style import Figure, in_lines, in_style, new_figure, texts
+from hicp_lib.study.plots.style import COLUMN_IN, Figure, in_lines, in_style, new_figure, texts
 
 _CELL_RATIOS = (0.4, 1.7)  # height over width of a cell: at least, at most
 
@@ -146,5 +146,5 @@ def detections_grid(
         *texts("detections_grid", **said),
         row_titles=list(pictures) if len(pictures) > 1 else (),
         titles=detectors,
-        cell_in=min(3.2, 11 / columns),
+        cell_in=COLUMN_IN / max(columns, 2),
     )

@@ -12,9 +12,9 @@ from hicp_lib.core.keypoints import HANDS, INDEX, LIMBS, N_KEYPOINTS
 from hicp_lib.inspection.skeletons import draw_rings
 from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
+from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour, detector_marker
 from hicp_lib.study.plots.people import detections_grid
-from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
+from hicp_lib.study.plots.style import COLUMN_IN, Figure, in_style, new_figure, texts
 from hicp_lib.study.table_format import intervals_over
 
 _AXES = ("x_m", "y_m", "z_m")
@@ -24,8 +24,7 @@ _DIRECTIONS = {
 }  # fmt: skip
 # Fewer images than this say little about a spread.
 MIN_IMAGES = 5
-_SPREAD, _BIAS = "spread: distance to the median [cm]", "bias: median to truth [cm]"
-_PART_MARKERS = {"shoulder": "^", "elbow": "s", "wrist": "o", "hand": "*"}
+_SPREAD, _BIAS = "spread: from the median [cm]", "bias: median to truth [cm]"
 
 
 def camera_views(
@@ -79,8 +78,10 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
     fewest = min(MIN_IMAGES, medians["n"].max())
     medians = medians[medians["n"] >= fewest]
     views = medians["view"].unique()
-    figure, axes = new_figure(len(views), 3, 10.5, 3.1 * len(views) + 0.4, squeeze=False)
     limits = {name: (medians[name].min() - 0.05, medians[name].max() + 0.05) for name in _AXES}
+    widths = [float(np.ptp(limits[across])) for across, _ in _DIRECTIONS.values()]
+    shape = {"width_ratios": widths, "squeeze": False}
+    figure, axes = new_figure(len(views), 3, COLUMN_IN, 3.1 * len(views) + 0.5, **shape)
     for row, view in zip(axes, views, strict=True):
         skeletons = dict(list(medians[medians["view"] == view].groupby("detector", sort=False)))
         lines = [(name, rows, detector_colour(name), "-") for name, rows in skeletons.items()]
@@ -89,11 +90,11 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
         for axis, (direction, columns) in zip(row, _DIRECTIONS.items(), strict=True):
             for name, rows, colour, style in lines:
                 _draw_skeleton(axis, rows, columns, colour, style, name)
-            axis.set(aspect="equal", title=f"{view} · {direction}")
             across, up = columns
-            axis.set(xlabel=f"{across[0]} [m]", ylabel=f"{up[0]} [m]", xlim=limits[across], ylim=limits[up])
+            axis.set(aspect="equal", xlim=limits[across], ylim=limits[up])
+            axis.set(title=direction, xlabel=f"{across[0]} [m]", ylabel=f"{view}, {up[0]} [m]")
             axis.yaxis.set_inverted(up == "x_m")  # forward is up
-    marks.legend_below(figure, axes)
+    marks.legend_below(figure, axes, ncols=2)
     counts = medians.groupby(["detector", "view"], sort=False).size()
     dashed = "; dashed: the true skeleton" * bool(truth)
     told = texts("median_skeletons", fewest=fewest, dashed=dashed, note=note, said=counts)
@@ -102,13 +103,14 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
 
 def _draw_skeleton(axis, rows: pd.DataFrame, columns: tuple[str, str], colour, style, label) -> None:
     pen = {"color": colour, "linestyle": style, "alpha": 0.9}
-    axis.plot(*limb_lines(rows, columns, BODY_LIMBS).T, lw=1.6, label=label, **pen)
+    marker = None if style == "--" else detector_marker(label)
+    axis.plot(*limb_lines(rows, columns, BODY_LIMBS).T, lw=1.4, marker=marker, ms=4, label=label, **pen)
     axis.plot(*limb_lines(rows, columns, HAND_LIMBS).T, lw=0.7, **pen)
 
 
 @in_style
 def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
-    """How far apart the views are against how far off their median is, per part, detector and view.
+    """How far apart the views are against how far off their median is: a panel per joint, a mark per side.
 
     Parameters
     ----------
@@ -119,39 +121,32 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
     note : str
         What the data are, for the caption.
     """
-    table = table[table["method"] == method]
-    table = table[(table["n_images"] >= min(MIN_IMAGES, table["n_images"].max())) & table["spread_m"].notna()]
-    size = max(4.6 * table["view"].nunique(), 6), 4.9
-    figure, axes, panels = marks.panels(table, ["view"], *size, sharex=True, sharey=True)
-    for axis, rows, view in panels:
-        for _, row in rows.groupby(["part", "detector"], sort=False):
-            _draw_spread_and_bias(axis, row)
-        axis.set(xscale="log", yscale="log", title=view, xlabel=_SPREAD)
-        for scale in (axis.xaxis, axis.yaxis):  # at 1, 2 and 5, written as plain numbers
+    rows = table[table["method"] == method]
+    rows = rows[(rows["n_images"] >= min(MIN_IMAGES, rows["n_images"].max())) & rows["spread_m"].notna()]
+    rows = rows.assign(joint=rows["part"].str.split().str[1] + "s")
+    views = list(rows["view"].unique())
+    size = COLUMN_IN, 1.2 + 2.6 * np.ceil(rows["joint"].nunique() / 2)
+    figure, axes, panels = marks.panels(rows, ["joint"], *size, wrap=2, sharex=True, sharey=True)
+    for axis, of_joint, joint in panels:
+        for (detector, view), dots in of_joint.groupby(["detector", "view"], sort=False):
+            (x, xerr), (y, yerr) = (
+                (100 * dots[name], 100 * marks.whiskers(dots, name, f"{name}_low", f"{name}_high"))
+                for name in ("spread_m", "bias_m")
+            )
+            pen = marks.detector_dots([detector])[detector] | {"label": f"{detector}, {view}"}
+            pen |= {"mfc": "white"} if views.index(view) else {}
+            axis.errorbar(x, y, xerr=xerr, yerr=yerr, ms=6.5, elinewidth=0.7, **pen)
+        axis.set(xscale="log", yscale="log", title=joint, xlabel=_SPREAD, ylabel=_BIAS)
+        for scale in (axis.xaxis, axis.yaxis):  # plain numbers
             scale.set_major_locator(LogLocator(subs=(1, 2, 5)))
             scale.set_major_formatter("{x:g}")
             scale.set_minor_locator(NullLocator())
         axis.axline((1, 1), (2, 2), color="#888888", lw=1, ls="--")
-    axes[0, 0].set(ylabel=_BIAS)
-    shapes = {name: {"marker": marker, "ls": ""} for name, marker in _PART_MARKERS.items()}
-    sides = {"left": {"marker": "o", "ls": ""}, "right": {"marker": "o", "ls": "", "mfc": "white"}}
-    marks.add_keys(axes[0, 0], table["detector"].unique(), shapes | sides)
-    marks.legend_below(figure, axes[0, 0], ncols=5)
-    worse = table.assign(mostly=np.where(table["bias_m"] > table["spread_m"], "bias", "spread"))
-    counts = worse.groupby(["detector", "mostly"], sort=False).size()
-    told = texts("spread_against_bias", intervals=intervals_over(table), note=note, said=counts)
-    return Figure(figure, *told, table)
-
-
-def _draw_spread_and_bias(axis, row: pd.DataFrame) -> None:
-    """One part of one detector: a mark with its intervals in both directions."""
-    side, kind = row["part"].iloc[0].split()
-    colour = detector_colour(row["detector"].iloc[0])
-    x_cm, y_cm = 100 * row["spread_m"], 100 * row["bias_m"]
-    spread, bias = ((name, f"{name}_low", f"{name}_high") for name in ("spread_m", "bias_m"))
-    reach_cm = {"xerr": 100 * marks.whiskers(row, *spread), "yerr": 100 * marks.whiskers(row, *bias)}
-    pen = {"color": colour, "mfc": colour if side == "left" else "white", "markersize": 8, "elinewidth": 0.7}
-    axis.errorbar(x_cm, y_cm, fmt=_PART_MARKERS[kind], **reach_cm, **pen)
+        axis.label_outer()
+    marks.legend_below(figure, axes, ncols=2)
+    n_bias, n = (rows["bias_m"] > rows["spread_m"]).sum(), len(rows)
+    told = {"method": method, "filled": views[0], "intervals": intervals_over(rows), "note": note}
+    return Figure(figure, *texts("spread_against_bias", **told, n_bias=n_bias, n=n), table)
 
 
 BODY_LIMBS = [limb for limb in LIMBS if limb[0] not in HANDS]

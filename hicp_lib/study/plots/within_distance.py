@@ -1,21 +1,19 @@
-"""Figures of the share of images in which keypoints were found within a distance: curves and bars.
+"""Figures of the share of images in which keypoints were found within a distance: curves and dots.
 
-Tables are those of `hicp_lib.evaluation.space.stability.within_distance`, with one reference; or like them.
+Tables are those of `hicp_lib.evaluation.space.stability.within_distance`; or like them.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.style import TEXTS, Figure, in_style, texts
+from hicp_lib.study.plots.palette import detector_colour, detector_marker
+from hicp_lib.study.plots.style import COLUMN_IN, TEXTS, Figure, in_style, texts
 from hicp_lib.study.table_format import intervals_over
 
 _METHOD_LINES = {"robust": "-", "paper": ":"}
-# Darker is closer.
-_FADES = (1.0, 0.62, 0.34)
 
 
 @in_style
@@ -25,72 +23,72 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
     Parameters
     ----------
     table : pd.DataFrame
-        At many thresholds.
+        At many thresholds, from one reference.
     marked_m : sequence of float
-        Distances marked in grey; the alt text gives the shares at the middle one.
+        Where the curves bear the detectors' marks; the alt text gives the shares at the middle one.
     note : str
         What the data are, for the caption.
     """
-    table = table.assign(kind=table["part"].str.split().str[1])
-    size = max(2.6 * table["kind"].nunique(), 6), 0.7 + 2.4 * table["view"].nunique()
-    figure, axes, panels = marks.panels(table, ["view", "kind"], *size, sharex=True, sharey=True)
-    for axis, rows, view, kind in panels:
+    table = table.assign(kind=table["part"].str.split().str[1] + "s")
+    by = ["kind", "view"] if table["view"].nunique() > 1 else ["view", "kind"]
+    height_in = 1.3 + 1.6 * table[by[0]].nunique()
+    figure, axes, panels = marks.panels(table, by, COLUMN_IN, height_in, sharex=True, sharey=True)
+    for axis, rows, *case in panels:
         curves = rows.groupby(["detector", "method", "threshold_m"], sort=False)["value"].mean()
         for (detector, method), curve in curves.groupby(level=[0, 1], sort=False):
-            pen = {"color": detector_colour(detector), "lw": 1.8, "label": f"{detector}, {method}"}
-            distance_cm = 100 * curve.index.get_level_values("threshold_m")
-            axis.plot(distance_cm, curve, _METHOD_LINES.get(method, "--"), **pen)
-        axis.vlines([100 * distance for distance in marked_m], 0, 1, color="#AAAAAA", lw=0.8)
-        axis.set(title=f"{view} · {kind}s", ylim=(0, 1.02), xlim=(0, None))
+            distance_m = curve.index.get_level_values("threshold_m").to_numpy()
+            marked = np.flatnonzero(np.isclose(distance_m[:, None], marked_m).any(axis=1)).tolist()
+            pen = {"color": detector_colour(detector), "marker": detector_marker(detector), "ms": 5.5}
+            axis.plot(100 * distance_m, curve, ls=_METHOD_LINES.get(method, "--"), markevery=marked, **pen)
+        axis.set(title=" · ".join(case) if by[0] == "kind" else case[1], ylim=(0, 1.04), xlim=(0, None))
         axis.set(xlabel="distance [cm]", ylabel="share of images")
         axis.label_outer()
-    marks.legend_below(figure, axes, ncols=3)
-    return Figure(figure, *texts("within_curves", **_told(table, marked_m), note=note), table)
+    detectors, methods = table["detector"].unique(), table["method"].unique()
+    keys = {name: {"color": detector_colour(name), "marker": detector_marker(name)} for name in detectors}
+    lines = {f"{name} lifting": {"ls": _METHOD_LINES.get(name, "--")} for name in methods}
+    marks.add_keys(axes[0, 0], (), keys | lines)
+    marks.legend_below(figure, axes[0, 0], ncols=3)
+    middle_m = marked_m[len(marked_m) // 2]
+    rows = table[np.isclose(table["threshold_m"], middle_m)]
+    means = rows.groupby(["detector", "view", "method"], sort=False)["value"].mean()
+    said = {
+        "reference": TEXTS["references"][table["reference"].iloc[0]],
+        "distances": [f"{100 * distance_m:g}" for distance_m in marked_m],
+        "nearest_cm": 100 * middle_m,
+        "said": means,
+        "ends": means.iloc[[means.argmax(), means.argmin()]],
+    }
+    return Figure(figure, *texts("within_curves", **said, note=note), table)
 
 
 @in_style
-def within_bars(table: pd.DataFrame, note: str) -> Figure:
-    """Share of images per view, keypoint and detector, the darker the closer; `table` of one method."""
-    parts, detectors = (list(table[column].unique()) for column in ("part", "detector"))
-    width, limits_m = 0.84 / len(detectors), sorted(set(table["threshold_m"]))
-    size = 10.5, 0.9 + 2.5 * table["view"].nunique()
-    figure, axes, panels = marks.panels(table, ["view", "reference"], *size, sharex=True, sharey=True)
-    for axis, of_view, view, _ in panels:
-        for detector, rows in of_view.groupby("detector", sort=False):
-            k = detectors.index(detector)
-            x = rows["part"].map(parts.index) + marks.offset(k, len(detectors), width)
-            _draw_bars(axis, rows.assign(x=x), 0.94 * width, detector_colour(detector))
-        axis.set(title=view, ylabel="share of images", ylim=(0, 1.05))
-        axis.set_xticks(range(len(parts)), parts)
-        axis.grid(axis="x", visible=False)
-    fades = zip(limits_m, _FADES, strict=True)
-    shades = {f"within {100 * limit_m:g} cm": {"lw": 8, "alpha": fade} for limit_m, fade in fades}
-    marks.add_keys(axes[0, 0], detectors, shades | {"found at all": {"ls": ":"}})
-    marks.legend_below(figure, axes[0, 0])
-    told = {"methods": list(table["method"].unique()), "intervals": intervals_over(table), "note": note}
-    return Figure(figure, *texts("within_bars", **_told(table, limits_m), **told), table)
+def within_dots(table: pd.DataFrame, method: str, note: str) -> Figure:
+    """Share of images within one distance per keypoint and detector; views down, references across.
 
-
-def _draw_bars(axis, rows: pd.DataFrame, width: float, colour: str) -> None:
-    """Bars over each other, the widest distance first; an outline for found at any distance."""
-    for rank, (_, level) in reversed(list(enumerate(rows.groupby("threshold_m")))):
-        if rank == rows["threshold_m"].nunique() - 1:
-            axis.bar(level["x"], level["found"], width, fill=False, edgecolor=colour, ls=":")
-        axis.bar(level["x"], level["value"], width, color="white")
-        axis.bar(level["x"], level["value"], width, color=colour, alpha=_FADES[rank])
-        pen = {"fmt": "none", "ecolor": "black", "elinewidth": 0.8}
-        axis.errorbar(level["x"], level["value"], marks.whiskers(level), **pen)
-
-
-def _told(table: pd.DataFrame, marked_m: Sequence[float]) -> dict[str, Any]:
-    """The reference, the marked distances, and mean shares over the parts of every case at the middle one."""
-    middle_m = marked_m[len(marked_m) // 2]
-    nearest_m = min(table["threshold_m"], key=lambda threshold: abs(threshold - middle_m))
-    rows = table[table["threshold_m"] == nearest_m]
-    means = rows.groupby(["detector", "view", "method"], sort=False)["value"].mean()
-    return {
-        "reference": TEXTS["references"][table["reference"].iloc[0]],
-        "distances": [f"{100 * distance_m:g}" for distance_m in marked_m],
-        "nearest_cm": 100 * nearest_m,
-        "said": means,
-    }
+    Parameters
+    ----------
+    table : pd.DataFrame
+        From one reference or several; the middle one of its thresholds is drawn.
+    method : str
+        The lifting that is drawn.
+    note : str
+        What the data are, for the caption.
+    """
+    limits_m = sorted(set(table["threshold_m"]))
+    limit_m = limits_m[len(limits_m) // 2]
+    rows = table[(table["threshold_m"] == limit_m) & (table["method"] == method)]
+    parts, pens = list(rows["part"].unique()), marks.detector_dots(rows["detector"].unique())
+    height_in = 0.8 + (0.6 + 0.3 * len(parts)) * rows["view"].nunique()
+    shared = {"sharex": True, "sharey": True}
+    figure, axes, panels = marks.panels(rows, ["view", "reference"], COLUMN_IN, height_in, **shared)
+    for axis, of_panel, view, reference in panels:
+        marks.dots_in_rows(axis, of_panel, "part", "detector", parts, pens)
+        marks.name_rows(axis, parts)
+        label = f"within {100 * limit_m:g} cm of {TEXTS['references'][reference]}"
+        axis.set(title=f"{view} · {TEXTS['aims'][reference]}", xlabel=label, xlim=(-0.04, 1.04))
+        axis.label_outer()
+    marks.legend_below(figure, axes, ncols=3)
+    means = rows.groupby(["detector", "view", "reference"], sort=False)["value"].mean()
+    told = {"method": method, "limit_cm": 100 * limit_m, "intervals": intervals_over(table), "note": note}
+    told["ends"] = means.iloc[[means.argmax(), means.argmin()]]
+    return Figure(figure, *texts("within_dots", **told, said=means), table)

@@ -27,6 +27,13 @@ def test_panels_of_one_column_stand_side_by_side_and_there_is_one_without_rows()
     assert axes.shape == (1, 1) and panels == []
 
 
+def test_panels_of_one_column_are_wrapped_and_what_is_left_stays_empty():
+    table = pd.DataFrame({"joint": list("abc")})
+    _, axes, panels = marks.panels(table, ["joint"], 4.0, 3.0, wrap=2)
+    assert axes.shape == (2, 2) and [axis for axis, *_ in panels] == list(axes.flat[:3])
+    assert [axis.axison for axis in axes.flat] == [True, True, True, False]
+
+
 def test_whiskers_reach_to_the_interval_and_never_the_wrong_way():
     rows = pd.DataFrame({"v": [2.0, 5.0, 0.5, np.nan], "l": 1.0, "h": [4.0, 4.0, 4.0, 4.0]})
     below, above = marks.whiskers(rows, "v", "l", "h")

@@ -48,46 +48,51 @@ def errors() -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def test_distributions_compare_like_with_like_first(errors):
-    perfect = errors.assign(detector=PERFECT, error_m=0.03)[errors["detector"] == DETECTORS[0]]
-    both = pd.concat([errors.assign(method="robust"), errors, perfect])
-    figure = draw.error_distributions(both, paper_medians(), 0.1, "made up")
-    assert len(figure.figure.axes) == len(TABLE_JOINTS)
-    axis = figure.figure.axes[0]
-    labels = [label.get_text() for label in axis.get_yticklabels()]
-    assert labels == [
-        *(f"{name}, paper lifting" for name in (*DETECTORS, PERFECT)),
-        *(f"{name} (paper)" for name in ("alphapose", "mmpose", "detectron2", "openpose")),
-        *(f"{name}, robust lifting" for name in DETECTORS),
-    ]
-    diamonds = [line for line in axis.lines if line.get_marker() == "D"]
-    assert [float(line.get_xdata()[0]) for line in diamonds] == pytest.approx([4.0, 3.5, 16.7, 15.4])
-    assert [float(line.get_ydata()[0]) for line in diamonds] == [3, 4, 5, 6]
-    assert len(axis.patches) == 5
-    (floor,) = [line for line in axis.lines if line.get_linestyle() == ":"]
+@pytest.fixture
+def medians() -> pd.DataFrame:
+    """Two detectors and the perfect one at 5, 6 and 3 cm by the paper's lifting, and one by the robust."""
+    ours = zip((*DETECTORS, PERFECT), (0.05, 0.06, 0.03), strict=True)
+    cases = [("mediapipe", "robust", 0.02), *((name, "paper", median_m) for name, median_m in ours)]
+    rows = [(detector, method, joint, 0.1, 90, m, m - 0.01, m + 0.01)
+            for joint in TABLE_JOINTS for detector, method, m in cases]  # fmt: skip
+    columns = ["detector", "method", "keypoint", "min_score", "count", "median_m", "low_m", "high_m"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def test_medians_stand_above_the_papers_like_with_like(medians):
+    figure = draw.joint_medians(medians, paper_medians(), 0.1, "made up")
+    panels = figure.figure.axes
+    assert [axis.get_title("left") for axis in panels] == [joint.replace("_", " ") for joint in TABLE_JOINTS]
+    names = [label.get_text() for label in panels[0].get_yticklabels()]
+    theirs = [f"{name} (paper)" for name in ("alphapose", "mmpose", "detectron2", "openpose")]
+    assert names == [*DETECTORS, PERFECT, *theirs]
+    dots = {(round(float(line.get_xdata()[0]), 1), float(line.get_ydata()[0]), line.get_mfc() == "white")
+            for line, *_ in panels[0].containers}  # fmt: skip
+    ours = {(5.0, 0.0, False), (2.0, 0.0, True), (6.0, 1.0, False), (3.0, 2.0, False)}
+    assert dots == ours | {(4.0, 3.0, False), (3.5, 4.0, False), (16.7, 5.0, False), (15.4, 6.0, False)}
+    (floor,) = [line for line in panels[0].lines if line.get_linestyle() == ":"]
     assert floor.get_xdata() == pytest.approx([3.0, 3.0])
-    assert "true keypoints" in figure.caption
-    assert "true keypoints" not in draw.error_distributions(errors, paper_medians(), 0.1, "made up").caption
+    assert "mediapipe 5.0 to 5.0 cm" in figure.alt and "mmpose (paper) 2.8 to 4.2 cm" in figure.alt
+    assert "perfect detector 3.0 cm" in figure.caption and "true keypoints" in figure.caption
+    others = medians[medians["detector"] != PERFECT]
+    assert "true keypoints" not in draw.joint_medians(others, paper_medians(), 0.1, "made up").caption
 
 
-def test_a_detector_that_found_nothing_has_no_box(errors):
-    blind = errors.assign(score=errors["score"] * (errors["detector"] != "mediapipe"))
-    figure = draw.error_distributions(blind, paper_medians(), 0.3, "made up")
-    assert len(figure.figure.axes[0].patches) == 1 and "mediapipe" not in figure.alt
-
-
-def test_trajectories_show_gaps_of_the_motion_capture(errors):
-    figure = draw.trajectories(errors, TIMES_S, "right_wrist", 0.1, "made up")
-    line = figure.figure.axes[0].lines[0]
-    assert np.isnan(line.get_ydata()[40:50]).all() and np.isfinite(line.get_ydata()[:40]).all()
-    assert line.get_xdata()[0] == 0 and line.get_xdata()[-1] == pytest.approx((N - 1) / 15)
-    assert len(figure.figure.axes[2].lines) == 1 + len(DETECTORS)
-    assert f"mediapipe in {N - 10} frames" in figure.alt and set(figure.table["detector"]) == set(DETECTORS)
+def test_residuals_are_lifted_less_captured_and_have_gaps(errors):
+    figure = draw.residuals(errors, TIMES_S, "right_wrist", 0.1, "made up")
+    x, y, _ = figure.figure.axes
+    first = x.lines[0]
+    assert len(first.get_xdata()) == N - 10  # ten frames without motion capture
+    assert first.get_xdata()[0] == 0 and first.get_xdata()[-1] == pytest.approx((N - 1) / 15)
+    assert np.median(first.get_ydata()) == pytest.approx(3, rel=0.2) and not y.lines[0].get_ydata().any()
+    assert max(x.lines[1].get_ydata()) == pytest.approx(10)  # further off lies on the border
+    assert first.get_marker() != x.lines[1].get_marker()
+    assert f"cm in {N - 10} frames" in figure.alt and set(figure.table["detector"]) == set(DETECTORS)
 
 
 def test_a_joint_motion_capture_never_saw_can_still_be_drawn(errors):
     unseen = errors.assign(**{f"reference_{axis}_m": np.nan for axis in "xyz"}, error_m=np.nan)
-    assert draw.trajectories(unseen, TIMES_S, "left_wrist", 0.1, "made up").figure.axes
+    assert draw.residuals(unseen, TIMES_S, "left_wrist", 0.1, "made up").figure.axes
 
 
 def test_marks_lie_at_the_errors_and_gains_in_centimetres():
@@ -106,11 +111,20 @@ def test_marks_lie_at_the_errors_and_gains_in_centimetres():
     medians = pd.DataFrame(
         {"detector": "mmpose", "keypoint": ["left_wrist", "left_elbow"], "median_m": [0.027, 0.04]}
     )
-    figure = error_budget(table.assign(n_people=12, view="upper"), medians, "made up")
+    table = table.assign(
+        n_people=12, view="upper", detectable_m=np.where(table["kind"] == "gain", 0.004, np.nan)
+    )
+    both = pd.concat([table, table.assign(view="lower", value_m=9.0)])
+    figure = error_budget(both, "upper", medians, "made up")
     wrists, fingers = figure.figure.axes
     drawn = [(line.get_marker(), list(line.get_xdata())) for line in wrists.get_lines()]
-    for marker, at_cm in (("o", [5, 4]), ("o", [3]), ("D", [2]), ("|", [2.7])):
+    for marker, at_cm in (("s", [5, 4]), ("s", [3]), ("s", [2]), ("|", [2.7])):
         assert (marker, pytest.approx(at_cm)) in drawn
     assert [label.get_text() for label in wrists.get_yticklabels()] == [ALL, AGAINST_MOCAP, "skin depth"]
     assert "wrists, paper lifting: skin depth with 3.0 cm" in figure.alt
-    assert "12 people" in figure.caption and "mmpose" in figure.caption and "made up" in figure.caption
+    assert "would show: 0.4 cm" in figure.caption and figure.table["view"].nunique() == 2
+    assert (
+        "12 people" in figure.caption
+        and "the paper's best medians" in figure.caption
+        and "made up" in figure.caption
+    )

@@ -47,30 +47,29 @@ def shares() -> pd.DataFrame:
 def test_curves_rise_with_the_distance_one_per_detector_and_method(shares):
     figure = within_distance.within_curves(shares, (0.025, 0.05, 0.1), "made up")
     axis = figure.figure.axes[0]
-    assert len(axis.get_lines()) == len(DETECTORS) * 2
+    assert len([line for line in axis.get_lines() if len(line.get_xdata())]) == len(DETECTORS) * 2
     assert axis.get_lines()[0].get_xdata().tolist() == pytest.approx([2.5, 5, 10])
     assert axis.get_lines()[0].get_ydata().tolist() == pytest.approx([0.1, 0.2, 0.4])
-    assert "mediapipe upper robust 20%" in figure.alt and "made up" in figure.caption
+    assert {line.get_marker() for line in axis.get_lines()[:4]} == {DETECTOR_STYLES[d][1] for d in DETECTORS}
+    assert "mediapipe, upper, robust lifting 20%" in figure.alt and "made up" in figure.caption
     assert "median position" in figure.caption
 
 
-def test_bars_are_as_high_as_the_shares_and_say_of_what(shares):
-    rows = shares[shares["method"] == "robust"].assign(reference="truth")
-    figure = within_distance.within_bars(rows, "made up")
-    axis = figure.figure.axes[0]
-    heights = {round(bar.get_height(), 6) for bar in axis.patches}
-    assert {0.1, 0.2, 0.4, 0.9} <= heights
-    lowest = figure.figure.axes[-1]
-    assert [label.get_text() for label in lowest.get_xticklabels()] == list(PARTS)
-    assert "2.5, 5 and 10 cm of its true position" in figure.caption
-    assert figure.table["value"].tolist() == rows["value"].tolist()
-
-
-def test_bars_lie_over_each_other_with_the_closest_in_front(shares):
-    rows = shares[(shares["method"] == "robust") & (shares["view"] == "upper")]
-    axis = within_distance.within_bars(rows, "x").figure.axes[0]
-    coloured = [bar.get_height() for bar in axis.patches if bar.get_alpha() is not None and bar.get_height()]
-    assert coloured[:4] == pytest.approx([0.4] * 4) and coloured[8:12] == pytest.approx([0.1] * 4)
+def test_dots_lie_at_the_shares_precision_beside_accuracy(shares):
+    both = pd.concat([shares, shares.assign(reference="truth", value=shares["value"] / 2)])
+    figure = within_distance.within_dots(both, "robust", "made up")
+    panels = figure.figure.axes
+    assert [axis.get_title("left") for axis in panels] == [
+        "upper · precision", "upper · accuracy", "lower · precision", "lower · accuracy",
+    ]  # fmt: skip
+    assert panels[2].get_xlabel() == "within 5 cm of its median position"
+    precision, accuracy = ([bars.lines[0] for bars in axis.containers] for axis in panels[:2])
+    assert [line.get_xdata().tolist() for line in precision] == [[0.2] * len(PARTS)] * len(DETECTORS)
+    assert [line.get_xdata().tolist() for line in accuracy] == [[0.1] * len(PARTS)] * len(DETECTORS)
+    assert [line.get_marker() for line in precision] == [DETECTOR_STYLES[name][1] for name in DETECTORS]
+    assert [label.get_text() for label in panels[0].get_yticklabels()] == list(PARTS)
+    assert "mediapipe, upper, of the truth 10%" in figure.alt and "made up" in figure.caption
+    assert figure.table["value"].tolist() == both["value"].tolist()
 
 
 def test_skeletons_are_drawn_per_view_and_direction_with_the_truth_dashed():
@@ -104,11 +103,11 @@ def test_spread_and_bias_are_in_centimetres_and_rare_parts_left_out():
         "robust",
         "made up",
     )
-    assert figure.table["part"].tolist() == ["left wrist"]
-    marker = figure.figure.axes[0].get_lines()[0]
-    assert marker.get_xydata()[0].tolist() == pytest.approx([1, 3])
+    (marker,) = [bars.lines[0] for axis in figure.figure.axes for bars in axis.containers]
+    assert marker.get_xydata().ravel().tolist() == pytest.approx([1, 3])
     assert marker.get_color() == DETECTOR_STYLES["mediapipe"][0]
-    assert "mediapipe 1 with more bias" in figure.alt
+    assert marker.get_marker() == DETECTOR_STYLES["mediapipe"][1]
+    assert "1 of 1 marks have more bias" in figure.alt and "lie 1 of 1 marks" in figure.caption
 
 
 def test_camera_views_have_a_row_per_frame_and_view_and_a_column_per_detector(monkeypatch):
