@@ -49,7 +49,7 @@ def raised(limit: float) -> float:
     raise InputError(f"{LIMITS_VARIABLE} is {text!r}; expected what limits are multiplied by, such as 4")
 
 
-def limited_child(path: Path, function: Callable, *arguments: Any) -> Any:
+def limited_child(path: Path, function: Callable, *arguments: Any, least_s: float = _LEAST_S) -> Any:
     """What a function answers in a process of its own, which ends with it.
 
     Parameters
@@ -60,6 +60,8 @@ def limited_child(path: Path, function: Callable, *arguments: Any) -> Any:
         Of a module; takes the path as text, and `arguments`.
     *arguments : object
         JSON-able, as what it returns.
+    least_s : float, optional
+        How long it may compute at the smallest file.
 
     Returns
     -------
@@ -70,16 +72,18 @@ def limited_child(path: Path, function: Callable, *arguments: Any) -> Any:
     InputError
         Its own, or if it takes too long or too much memory, or its process ends.
     """
-    *_, answer = limited_parts(path, function, *arguments)
+    *_, answer = limited_parts(path, function, *arguments, least_s=least_s)
     return json.loads(answer)
 
 
-def limited_parts(path: Path, function: Callable, *arguments: Any) -> Iterator[bytes]:
+def limited_parts(
+    path: Path, function: Callable, *arguments: Any, least_s: float = _LEAST_S
+) -> Iterator[bytes]:
     """As `limited_child`, what a generator gives, part by part; each part gets time anew.
 
     Parameters
     ----------
-    path, function, *arguments
+    path, function, *arguments, least_s
         As of `limited_child`; what the function yields are bytes.
 
     Yields
@@ -96,7 +100,7 @@ def limited_parts(path: Path, function: Callable, *arguments: Any) -> Iterator[b
     if not files or not all(map(Path.is_file, files)):
         raise InputError(f"{path}: is no file and no folder of files; check the path")
     n_bytes = sum(file.stat().st_size for file in files)
-    limits = [raised(_LEAST_S + per_byte * n_bytes) for per_byte in (_S_PER_BYTE, _MOST_S_PER_BYTE)]
+    limits = [raised(least_s + per_byte * n_bytes) for per_byte in (_S_PER_BYTE, _MOST_S_PER_BYTE)]
     limits.append(raised(_LEAST_BYTES + _BYTES_PER_BYTE * n_bytes))
     question = json.dumps([function.__module__, function.__qualname__, [str(path), *arguments], limits])
     command = [sys.executable, "-c", _PROGRAM, str(Path(__file__).resolve().parents[2])]
@@ -120,7 +124,7 @@ def limited_parts(path: Path, function: Callable, *arguments: Any) -> Iterator[b
         return
     took_long = code in (-signal.SIGXCPU, -signal.SIGPROF)
     if took_long or "MemoryError" in last:
-        most = f"{limits[0]:.0f} s" if took_long else f"{limits[2] / 1e9:.2g} GB of memory"
+        most = f"{limits[0]:.2g} s" if took_long else f"{limits[2] / 1e9:.2g} GB of memory"
         raise InputError(f"{path}: reading takes more than {most}; if the file is sound, {RAISE}")
     how = signal.Signals(-code).name if code < 0 else last[:160]
     raise InputError(f"{path}: its reader gave up ({how}); is it damaged or cut off?")
