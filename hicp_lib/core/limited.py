@@ -124,7 +124,7 @@ def limited_parts(
         return
     took_long = code in (-signal.SIGXCPU, -signal.SIGPROF)
     if took_long or "MemoryError" in last:
-        most = f"{limits[0]:.2g} s" if took_long else f"{limits[2] / 1e9:.2g} GB of memory"
+        most = f"{limits[0]:.1f} s" if took_long else f"{limits[2] / 1e9:.2g} GB of memory"
         raise InputError(f"{path}: reading takes more than {most}; if the file is sound, {RAISE}")
     how = signal.Signals(-code).name if code < 0 else last[:160]
     raise InputError(f"{path}: its reader gave up ({how}); is it damaged or cut off?")
