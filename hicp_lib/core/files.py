@@ -90,38 +90,32 @@ def partial_name(folder: Path, suffix: str = "") -> Path:
 
 
 @contextmanager
-def held(path: Path) -> Iterator[None]:
-    """A block in which a file or folder is locked: what is not finished and not locked was left behind."""
-    with ExitStack() as stack:
-        if os.name == "posix":
-            stack.callback(os.close, descriptor := os.open(path, os.O_RDONLY))
-            lock(descriptor)
-        yield
-
-
-def lock(descriptor: int, waits: bool = False) -> bool | None:
-    """Lock an open file or folder against other processes until it is closed.
+def held(path: Path, waits: bool = False) -> Iterator[bool | None]:
+    """Lock a file or folder against other processes for a block; what nobody holds is not being written.
 
     Parameters
     ----------
-    descriptor : int
+    path : Path
     waits : bool, optional
         Whether to wait for another's lock to end.
 
-    Returns
-    -------
+    Yields
+    ------
     bool or None
         False if another has it; None if the system, or the file system, has no such locks.
     """
-    try:
-        import fcntl
+    is_locked: bool | None = None
+    with ExitStack() as stack:
+        with suppress(ImportError, OSError):
+            import fcntl
 
-        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
-    except BlockingIOError:
-        return False
-    except (ImportError, OSError):
-        return None
-    return True
+            stack.callback(os.close, descriptor := os.open(path, os.O_RDONLY | os.O_NONBLOCK))
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
+                is_locked = True
+            except BlockingIOError:
+                is_locked = False
+        yield is_locked
 
 
 def remove_left(folder: Path, below: bool = False) -> None:
@@ -134,16 +128,10 @@ def remove_left(folder: Path, below: bool = False) -> None:
         Whether in folders below it, too.
     """
     for left in (folder.rglob if below else folder.glob)(f"{_PARTIAL}{'[0-9a-f]' * 16}*"):
-        with suppress(OSError):
-            descriptor = os.open(left, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-            try:
-                is_free, is_old = lock(descriptor), time.time() - left.stat().st_mtime > _OLD_S
-                if is_free and left.is_dir():
-                    shutil.rmtree(left)
-                elif is_free or (is_free is None and is_old):
-                    left.unlink()
-            finally:
-                os.close(descriptor)
+        with suppress(OSError), held(left) as is_ours:
+            is_old = left.is_file() and time.time() - left.stat().st_mtime > _OLD_S
+            if is_ours or (is_ours is None and is_old):
+                shutil.rmtree(left) if left.is_dir() else left.unlink()
 
 
 def write_bytes(path: str | Path, content: bytes, sync: bool = True) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import cache_dir, held, lock, natural_order, partial_name, read_json, remove_left
+from hicp_lib.core.files import cache_dir, held, natural_order, partial_name, read_json, remove_left
 from hicp_lib.core.names import is_inside
 
 
@@ -100,12 +100,9 @@ def locked_folder(folder: str | Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
         raise InputError(f"{folder}: is a file, or lies in one; give a folder") from None
-    with ExitStack() as stack:
-        if os.name == "posix":
-            stack.callback(os.close, descriptor := os.open(folder, os.O_RDONLY))
-            waits = folder.resolve().is_relative_to(cache_dir().resolve())
-            if lock(descriptor, waits) is False:
-                raise InputError(f"{folder}: another command writes there; wait for it to end")
+    with held(folder, waits=folder.resolve().is_relative_to(cache_dir().resolve())) as is_ours:
+        if is_ours is False:
+            raise InputError(f"{folder}: another command writes there; wait for it to end")
         remove_left(folder, below=True)
         try:
             yield
