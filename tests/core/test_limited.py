@@ -108,7 +108,7 @@ def test_who_has_enough_parts_ends_the_process(file):
 @pytest.mark.parametrize(
     ("function", "said"),
     [
-        (spin, "a.bin: reading takes more than 0\.4 s; .*HICP_LIMITS=4"),
+        (spin, "a.bin: reading takes more than 0.4 s; .*HICP_LIMITS=4"),
         (never_end, "a.bin: reading takes more than"),
         (grow, "a.bin: reading takes more than 0.08. GB of memory; .*HICP_LIMITS=4"),
         (crash, "a.bin: its reader gave up .SIGABRT."),
