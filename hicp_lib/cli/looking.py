@@ -8,7 +8,7 @@ import click
 
 from hicp_lib.cli.options import PATH, FiniteRange, say
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.folders import locked_folder
+from hicp_lib.core.folders import filled_folder
 
 
 @click.command("inspect")
@@ -41,7 +41,6 @@ def draw(
     """Draw detections over their pictures, worst first: an HTML page, or PNG files."""
     from hicp_lib.formats.annotations import read_annotations, read_detections
     from hicp_lib.inspection.gallery import image_paths, pictures, write_page, write_pngs
-    from hicp_lib.recordings.writer import refuse_used_folder
 
     if out.suffix not in ("", ".html"):
         raise InputError(f"{out}: expected a name that ends in .html, or a folder for PNG files")
@@ -52,8 +51,7 @@ def draw(
     if out.suffix:
         write_page(first, out, f"{detections.name} over {images.name}", say)
     else:
-        with locked_folder(out):
-            refuse_used_folder(out)
-            write_pngs(first, out, min_score, say)
+        with filled_folder(out) as inner:
+            write_pngs(first, inner, min_score, say)
     rest = f" of {len(chosen)}, worst first; --limit N for more" if len(chosen) > limit else ""
     click.echo(f"{out}: {len(first)} pictures{rest}")

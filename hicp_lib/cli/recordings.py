@@ -8,7 +8,7 @@ import click
 from hicp_lib.cli import options
 from hicp_lib.cli.options import PATH, FiniteRange, detector_options, given, people_option, worker_options
 from hicp_lib.core.files import write_table
-from hicp_lib.core.folders import locked_folder
+from hicp_lib.core.folders import filled_folder, locked_folder
 
 
 @click.group()
@@ -101,14 +101,14 @@ def import_(
         message = "Give one of --poses, --base-frame and --joint-states."
         raise click.UsageError(message, click.get_current_context())
     source = read_pose_source(poses, mount)
-    with locked_folder(out):
+    with filled_folder(out) as inner:
         if bag is not None:
             from hicp_lib.recordings.bags import import_bag
 
             topics, joints_mount = (color_topic, depth_topic), mount if joint_states else None
-            n, notes = import_bag(bag, out, source, topics, base_frame, joints_mount)
+            n, notes = import_bag(bag, inner, source, topics, base_frame, joints_mount)
         else:
-            n, notes = import_open3d(folder, out, source, rate, depth_scale)
+            n, notes = import_open3d(folder, inner, source, rate, depth_scale)
     _tell(out, n, notes)
 
 

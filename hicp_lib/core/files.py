@@ -8,9 +8,11 @@ import math
 import os
 import re
 import secrets
+import shutil
 import stat
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 MAX_BYTES = 2e9  # of a file that is read whole
+_PARTIAL = ".partial-"
+_OLD_S = 3600.0  # without locks: what nobody wrote to for so long was left behind
 
 
 def cache_dir() -> Path:
@@ -61,15 +65,16 @@ def atomic_path(path: str | Path, sync: bool = True) -> Iterator[Path]:
             raise InputError(f"{named}: is {_kind(mode)}; give the name of a file to write")
         if not (mode & stat.S_IWUSR and os.access(path, os.W_OK)):
             raise InputError(f"{named}: is write-protected; give another name, or make it writable")
-    temporary = path.parent / f".partial-{secrets.token_hex(8)}{path.suffix}"
+    temporary = partial_name(path.parent, path.suffix)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # less the caller's mask
-        yield temporary
-        if sync:
-            with open(temporary, "rb+") as file:
-                os.fsync(file.fileno())
-        os.replace(temporary, path)
+        with held(temporary):
+            yield temporary
+            if sync:
+                with open(temporary, "rb+") as file:
+                    os.fsync(file.fileno())
+            os.replace(temporary, path)
     except OSError as error:
         if str(error.filename) in ("None", str(temporary)):  # report the name that was given
             error.filename = str(named)
@@ -77,6 +82,56 @@ def atomic_path(path: str | Path, sync: bool = True) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             temporary.unlink()
+
+
+def partial_name(folder: Path, suffix: str = "") -> Path:
+    """A new name in a folder for what is not finished."""
+    return folder / f"{_PARTIAL}{secrets.token_hex(8)}{suffix}"
+
+
+@contextmanager
+def held(path: Path, waits: bool = False) -> Iterator[bool | None]:
+    """Lock a file or folder against other processes for a block; what nobody holds is not being written.
+
+    Parameters
+    ----------
+    path : Path
+    waits : bool, optional
+        Whether to wait for another's lock to end.
+
+    Yields
+    ------
+    bool or None
+        False if another has it; None if the system, or the file system, has no such locks.
+    """
+    is_locked: bool | None = None
+    with ExitStack() as stack:
+        with suppress(ImportError, OSError):
+            import fcntl
+
+            stack.callback(os.close, descriptor := os.open(path, os.O_RDONLY | os.O_NONBLOCK))
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
+                is_locked = True
+            except BlockingIOError:
+                is_locked = False
+        yield is_locked
+
+
+def remove_left(folder: Path, below: bool = False) -> None:
+    """Remove what killed processes left half-written in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+    below : bool, optional
+        Whether in folders below it, too.
+    """
+    for left in (folder.rglob if below else folder.glob)(f"{_PARTIAL}{'[0-9a-f]' * 16}*"):
+        with suppress(OSError), held(left) as is_ours:
+            is_old = left.is_file() and time.time() - left.stat().st_mtime > _OLD_S
+            if is_ours or (is_ours is None and is_old):
+                shutil.rmtree(left) if left.is_dir() else left.unlink()
 
 
 def write_bytes(path: str | Path, content: bytes, sync: bool = True) -> None:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import os
-import time
+import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import cache_dir, natural_order, read_json
+from hicp_lib.core.files import cache_dir, held, natural_order, partial_name, read_json, remove_left
 from hicp_lib.core.names import is_inside
-
-_OLD_S = 3600.0  # a temporary file not written to for this long is a leftover
 
 
 def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "", what: str = "a folder") -> list[str]:
@@ -85,7 +83,7 @@ def locked_folder(folder: str | Path) -> Iterator[None]:
     """Let one process at a time fill a folder, which is created if missing.
 
     The folder itself is locked, and the system releases the lock when the process ends; on systems without
-    such locks nothing is locked. Half-written files older than an hour are removed.
+    such locks nothing is locked. Half-written files that killed processes left there are removed.
 
     Parameters
     ----------
@@ -102,25 +100,66 @@ def locked_folder(folder: str | Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
         raise InputError(f"{folder}: is a file, or lies in one; give a folder") from None
-    with ExitStack() as stack:
-        with suppress(ImportError):
-            import fcntl
-
-            stack.callback(os.close, descriptor := os.open(folder, os.O_RDONLY))
-            waits = folder.resolve().is_relative_to(cache_dir().resolve())
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
-            except BlockingIOError:
-                raise InputError(f"{folder}: another command writes there; wait for it to end") from None
-            except OSError:
-                pass  # of a file system without locks
-        for left in folder.rglob(f".partial-{'[0-9a-f]' * 16}*"):
-            with suppress(OSError):
-                if time.time() - left.stat().st_mtime > _OLD_S:
-                    left.unlink()
+    with held(folder, waits=folder.resolve().is_relative_to(cache_dir().resolve())) as is_ours:
+        if is_ours is False:
+            raise InputError(f"{folder}: another command writes there; wait for it to end")
+        remove_left(folder, below=True)
         try:
             yield
         except BaseException:
             if is_new and not os.listdir(folder):
                 folder.rmdir()
             raise
+
+
+@contextmanager
+def filled_folder(folder: str | Path) -> Iterator[Path]:
+    """Fill a folder that is new or empty, all or nothing, and one process at a time.
+
+    Parameters
+    ----------
+    folder : str or Path
+
+    Yields
+    ------
+    Path
+        A hidden folder in it: what is put there moves up when the block succeeds.
+
+    Raises
+    ------
+    InputError
+        As of `locked_folder` and `refuse_used_folder`.
+    """
+    folder = Path(folder)
+    with locked_folder(folder):
+        refuse_used_folder(folder)
+        inner = partial_name(folder)
+        inner.mkdir()
+        try:
+            with held(inner):
+                yield inner
+                for path in sorted(inner.iterdir(), key=lambda path: (path.is_file(), path.name)):
+                    os.replace(path, folder / path.name)
+        except InputError as error:  # told by the names that were asked for
+            raise InputError(str(error).replace(str(inner), str(folder))) from None
+        except OSError as error:
+            error.filename = error.filename and str(error.filename).replace(str(inner), str(folder))
+            raise
+        finally:
+            shutil.rmtree(inner, ignore_errors=True)
+
+
+def refuse_used_folder(folder: Path) -> None:
+    """Nothing is written over what is there.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Raises
+    ------
+    InputError
+        If `folder` is a file, or holds anything but hidden files.
+    """
+    if folder.exists() and (not folder.is_dir() or listed(folder)):
+        raise InputError(f"{folder}: is there already; give a new or empty folder")

@@ -8,12 +8,12 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import IO, Any, cast
 
 from hicp_lib.core.children import ONE_THREAD, child_environment, end_with, lifeline
 from hicp_lib.core.errors import InputError
@@ -23,6 +23,7 @@ _LEAST_S, _S_PER_BYTE, _MOST_S_PER_BYTE = 4.0, 1e-6, 1e-4  # of computing; the l
 _LEAST_BYTES, _BYTES_PER_BYTE = 800 * 2**20, 40  # of memory
 _PROGRAM = """import sys; at = [*("-packages" in folder for folder in sys.path), True].index(True)
 sys.path.insert(at, sys.argv[1]); from hicp_lib.core import limited; limited.serve()"""
+_PART, _END = b"p", b"e"  # kinds of messages, of which each is kind, size and content
 _patience_s: list[float] = []  # of a limited process: how long one step may compute
 RAISE = f"{LIMITS_VARIABLE}=4 in the environment allows four times as much"
 """The end of a message about a limit."""
@@ -48,7 +49,7 @@ def raised(limit: float) -> float:
     raise InputError(f"{LIMITS_VARIABLE} is {text!r}; expected the factor for all limits, such as 4")
 
 
-def limited_child(path: Path, function: Callable, *arguments: Any) -> Any:
+def limited_child(path: Path, function: Callable, *arguments: Any, least_s: float = _LEAST_S) -> Any:
     """The result of a function that runs in a separate, limited process.
 
     Parameters
@@ -59,6 +60,8 @@ def limited_child(path: Path, function: Callable, *arguments: Any) -> Any:
         A module's function; takes the path as text, and `arguments`.
     *arguments : object
         JSON-able, like its result.
+    least_s : float, optional
+        How long it may compute at the smallest file.
 
     Returns
     -------
@@ -69,30 +72,70 @@ def limited_child(path: Path, function: Callable, *arguments: Any) -> Any:
     InputError
         Raised by the function, or if it takes too long or too much memory, or its process ends.
     """
+    *_, answer = limited_parts(path, function, *arguments, least_s=least_s)
+    return json.loads(answer)
+
+
+def limited_parts(
+    path: Path, function: Callable, *arguments: Any, least_s: float = _LEAST_S
+) -> Iterator[bytes]:
+    """As `limited_child`, what a generator gives, part by part; each part gets time anew.
+
+    Parameters
+    ----------
+    path, function, *arguments, least_s
+        As of `limited_child`; what the function yields are bytes.
+
+    Yields
+    ------
+    bytes
+        The parts, and what the function returns, as JSON.
+
+    Raises
+    ------
+    InputError
+        As of `limited_child`, after the parts until then.
+    """
     files = [path] if path.is_file() else [file for file in path.glob("*") if not file.is_dir()]
     if not files or not all(map(Path.is_file, files)):
         raise InputError(f"{path}: is neither a file nor a folder of files; check the path")
     n_bytes = sum(file.stat().st_size for file in files)
-    limits = [raised(_LEAST_S + per_byte * n_bytes) for per_byte in (_S_PER_BYTE, _MOST_S_PER_BYTE)]
+    limits = [raised(least_s + per_byte * n_bytes) for per_byte in (_S_PER_BYTE, _MOST_S_PER_BYTE)]
     limits.append(raised(_LEAST_BYTES + _BYTES_PER_BYTE * n_bytes))
     question = json.dumps([function.__module__, function.__qualname__, [str(path), *arguments], limits])
     command = [sys.executable, "-c", _PROGRAM, str(Path(__file__).resolve().parents[2])]
-    with TemporaryDirectory() as folder, lifeline() as stdin:
+    with TemporaryDirectory() as folder, lifeline() as stdin, open(Path(folder, "errors"), "w+b") as errors:
         Path(folder, "question").write_text(question)
         environment = child_environment(**ONE_THREAD, OPENCV_FOR_THREADS_NUM="1", TMPDIR=folder)
-        ended = subprocess.run(command, stdin=stdin, capture_output=True, env=environment)
-    code, last = ended.returncode, ended.stderr[-4096:].decode(errors="replace").strip().rpartition("\n")[2]
-    answer = {} if code else json.loads(ended.stdout)
-    if "value" in answer:
-        return answer["value"]
-    if "error" in answer:
-        raise InputError(answer["error"])
+        pipes: dict[str, Any] = {"stdin": stdin, "stdout": subprocess.PIPE, "stderr": errors}
+        with subprocess.Popen(command, env=environment, **pipes) as process:
+            answers = cast(IO[bytes], process.stdout)
+            try:
+                while (message := _received(answers)) and message[0] == _PART:
+                    yield message[1]
+                code = process.wait()
+            finally:
+                process.kill()
+        errors.seek(max(0, errors.seek(0, os.SEEK_END) - 4096))
+        last = errors.read().decode(errors="replace").strip().rpartition("\n")[2]
+    if message and not code:
+        if refusal := json.loads(message[1]):
+            raise InputError(refusal)
+        return
     took_long = code in (-signal.SIGXCPU, -signal.SIGPROF)
     if took_long or "MemoryError" in last:
-        most = f"{limits[0]:.0f} s" if took_long else f"{limits[2] / 1e9:.2g} GB of memory"
+        most = f"{limits[0]:.1f} s" if took_long else f"{limits[2] / 1e9:.2g} GB of memory"
         raise InputError(f"{path}: reading takes more than {most}; if the file is sound, {RAISE}")
     how = signal.Signals(-code).name if code < 0 else last[:160]
     raise InputError(f"{path}: its reader gave up ({how}); is it damaged or cut off?")
+
+
+def _received(stream: IO[bytes]) -> tuple[bytes, bytes] | None:
+    """Kind and content of the next message; None where there is none, or not a whole one."""
+    head = stream.read(9)
+    size = int.from_bytes(head[1:], "little")
+    content = stream.read(size) if len(head) == 9 else b""
+    return (head[:1], content) if len(head) == 9 and len(content) == size else None
 
 
 def serve() -> None:
@@ -111,12 +154,20 @@ def serve() -> None:
             resource.setrlimit(getattr(resource, f"RLIMIT_{name}"), (int(most), int(most) + 1))
     _patience_s.append(limits[0])
     went_on()
-    try:
-        answer = {"value": function(*arguments)}
-    except InputError as error:
-        answer = {"error": str(error)}
     with open(answers, "wb") as file:
-        file.write(json.dumps(answer).encode())
+
+        def send(kind: bytes, content: bytes) -> None:
+            file.writelines((kind, len(content).to_bytes(8, "little"), content))
+
+        refusal = None
+        try:
+            answer = function(*arguments)
+            for part in answer if isinstance(answer, Iterator) else [json.dumps(answer).encode()]:
+                send(_PART, part)
+                went_on()
+        except InputError as error:
+            refusal = str(error)
+        send(_END, json.dumps(refusal).encode())
 
 
 def went_on() -> None:

@@ -1,5 +1,6 @@
-"""Reading videos frame by frame."""
+"""Reading videos frame by frame, decoded in a separate process, which a damaged file may end."""
 
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,8 +10,10 @@ import numpy as np
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import regular_file
 from hicp_lib.core.images import refuse_too_large
+from hicp_lib.core.limited import limited_parts
 
 SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".webm")
+_HEAD = struct.Struct("<d3q")  # time in seconds, height, width, channels
 
 
 def open_video(path: str | Path) -> tuple[int, Iterator[tuple[float, np.ndarray]]]:
@@ -30,21 +33,32 @@ def open_video(path: str | Path) -> tuple[int, Iterator[tuple[float, np.ndarray]
     Raises
     ------
     InputError
-        If it cannot be read, or its frames have too many pixels.
+        If it cannot be read, or its frames have too many pixels; from the iterator, where decoding ends its
+        process or takes too long.
     """
-    capture = cv2.VideoCapture(str(regular_file(path, "give a video")))
-    if not capture.isOpened():
-        raise InputError(f"{path}: is not a video that OpenCV can read; give .mp4, .avi or .mov, or images")
-
-    sides_px = [int(capture.get(of)) for of in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)]
-    refuse_too_large(path, *sides_px)
+    parts = limited_parts(regular_file(path, "give a video"), _decode)
+    n_frames = int(next(parts))
 
     def frames() -> Iterator[tuple[float, np.ndarray]]:
-        while capture.grab():
-            time_s = capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3
-            decoded, bgr = capture.retrieve()
-            if not decoded:
-                return
+        for part in parts:
+            time_s, *shape = _HEAD.unpack_from(part)
+            bgr = np.frombuffer(part, np.uint8, offset=_HEAD.size).reshape(shape)
             yield time_s, cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
 
-    return max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT))), frames()
+    return n_frames, frames()
+
+
+def _decode(path: str) -> Iterator[bytes]:
+    """How many frames a video says it has, then each with its time and shape."""
+    capture = cv2.VideoCapture(path)
+    if not capture.isOpened():
+        raise InputError(f"{path}: is no video that OpenCV can read; give .mp4, .avi or .mov, or images")
+    sides_px = [int(capture.get(of)) for of in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)]
+    refuse_too_large(path, *sides_px)
+    yield b"%d" % max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
+    while capture.grab():
+        time_s = capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3
+        decoded, bgr = capture.retrieve()
+        if not decoded:
+            return
+        yield _HEAD.pack(time_s, *bgr.shape) + bgr.tobytes()

@@ -21,7 +21,7 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.extras import require
-from hicp_lib.core.files import atomic_path
+from hicp_lib.core.files import atomic_path, remove_left
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
 from hicp_lib.core.tables import read_table
 from hicp_lib.formats.layouts import PERSON_CATEGORY
@@ -75,6 +75,7 @@ def open_detections(path: str | Path) -> Iterator[_Append]:
         As `refuse_other_suffix`.
     """
     refuse_other_suffix(path)
+    remove_left(Path(path).resolve().parent)
     is_json = Path(path).suffix == ".json"
     with atomic_path(path) as temporary, json_list(temporary) if is_json else _table(temporary) as append:
         yield lambda image_id, facts, found, extras=None: append(
@@ -217,7 +218,7 @@ def read_rows(path: Path) -> Any:
         return read_people(path)
     refuse_other_suffix(path)
     columns = ("image_id", "person", "person_score", "keypoint", "u_px", "v_px", "score")
-    table = read_table(path, columns, float_precision="round_trip", dtype={"file_name": str})
+    table = read_table(path, columns, dtype={"file_name": str})
     try:
         keypoints = [INDEX[name] for name in table["keypoint"]]
         values = table[["u_px", "v_px", "score"]].to_numpy(float)

@@ -13,7 +13,7 @@ import numpy as np
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, read_json, write_bytes
-from hicp_lib.core.folders import listed
+from hicp_lib.core.folders import listed, refuse_used_folder
 from hicp_lib.core.images import decode
 from hicp_lib.formats.json_validation import is_number, shown
 from hicp_lib.recordings.camera_file import read_distorted_camera
@@ -21,7 +21,7 @@ from hicp_lib.recordings.recording import check_size, read_csv
 from hicp_lib.recordings.rectification import rectify
 from hicp_lib.recordings.trajectories import read_trajectory
 from hicp_lib.recordings.tum import names_poses
-from hicp_lib.recordings.writer import JPEG_QUALITY, Poses, refuse_used_folder, write_index
+from hicp_lib.recordings.writer import JPEG_QUALITY, Poses, write_index
 
 METADATA = ("intrinsic.json", "camera_intrinsic.json")
 _IMAGE_KINDS = (".png", ".jpg", ".jpeg")

@@ -13,8 +13,9 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.extras import needs, require
+from hicp_lib.core.folders import refuse_used_folder
 from hicp_lib.recordings.bags import import_bag
-from hicp_lib.recordings.writer import Poses, refuse_used_folder
+from hicp_lib.recordings.writer import Poses
 
 _N_JOINTS = 6
 Size = tuple[int, int]

@@ -9,6 +9,7 @@ import numpy as np
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import write_bytes
+from hicp_lib.core.folders import refuse_used_folder
 from hicp_lib.core.images import write_png
 from hicp_lib.recordings.camera_file import write_camera
 from hicp_lib.recordings.recording import CAMERA_FILE, DEPTH_LIST, POSES_FILE, RGB_LIST
@@ -180,19 +181,3 @@ def write_depth(path: str | Path, depth_m: np.ndarray, depth_units_per_m: float)
     units = np.rint(depth_m * depth_units_per_m)
     fits = (units >= 0) & (units <= _MOST_UNITS)  # NaN does not fit either
     write_png(path, np.where(fits, units, 0).astype(np.uint16))
-
-
-def refuse_used_folder(folder: Path) -> None:
-    """Refuse a folder with content, so that nothing is overwritten.
-
-    Parameters
-    ----------
-    folder : Path
-
-    Raises
-    ------
-    InputError
-        If `folder` is a file, or not empty.
-    """
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder}: is there already; give a new or empty folder")

@@ -2,7 +2,8 @@
 
 A run happens in a staging folder. It replaces the last one only if every cell completed, nothing was written
 to stderr, and the results have the run's parameters; its stamp is written last. Without a stamp, with another
-key, or if an output differs from the stamped one, the notebook runs again.
+key, or if an output differs from the stamped one, the notebook runs again. Other files beside the outputs, such
+as a user's notes, stay.
 """
 
 import json
@@ -10,8 +11,9 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -24,6 +26,7 @@ from hicp_lib.core.cache import code, digest, input_sha256
 from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, sha256_file, write_json
+from hicp_lib.core.folders import remove_inside
 from hicp_lib.core.limited import RAISE, raised
 from hicp_lib.report.notebooks import is_path, read_notebook, source_sha256
 from hicp_lib.report.run import WALL_LIMIT_S, Children, Folders, Run, RunError
@@ -187,9 +190,16 @@ def read_stamp(path: Path) -> dict[str, Any] | None:
 
 
 def outputs(name: str, folders: Folders) -> dict[str, str]:
-    """SHA-256 of the executed copy and of every result file."""
-    paths = [folders.executed / f"{name}.ipynb", *sorted((folders.results / name).rglob("*"))]
-    return {path.relative_to(folders.root).as_posix(): sha256_file(path) for path in paths if path.is_file()}
+    """SHA-256 of the executed copy and of every result file of a run, as far as they are there."""
+    made = _listed(folders.executed / f"{name}.json")
+    return {path: sha256_file(folders.root / path) for path in made if (folders.root / path).is_file()}
+
+
+def _listed(stamp: Path) -> list[str]:
+    """Outputs that a stamp names, also that of a run that is not finished; relative to the root."""
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        return list(json.loads(stamp.read_bytes())["outputs"])
+    return []
 
 
 def _run_notebook(run: Run, key: dict, earlier: Earlier, folders: Folders, children: Children) -> None:
@@ -209,21 +219,35 @@ def _run_notebook(run: Run, key: dict, earlier: Earlier, folders: Folders, child
             _refuse_changed(run, key, copy, earlier)
         except RunError as error:
             raise RunError(f"{name}: {error}{_keep_failed(copy, staging, folders)}") from None
-        _discard(name, folders)
-        folders.results.mkdir(parents=True, exist_ok=True)
-        os.replace(staging / "results" / name, folders.results / name)
-        os.replace(copy, folders.executed / copy.name)
+        results = staging / "results"
+        made = [path for path in sorted(results.rglob("*")) if path.is_file()]
+        moves = [(path, folders.results / path.relative_to(results)) for path in made]
+        moves.append((copy, folders.executed / copy.name))
+        _discard(name, folders, [target.relative_to(folders.root).as_posix() for _, target in moves])
+        for path, target in moves:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(path, target)
     stamp = {"key": key, "parameters": run.parameters, "outputs": outputs(name, folders)}
     write_json(folders.executed / f"{name}.json", stamp, indent=2)
 
 
-def _discard(name: str, folders: Folders) -> None:
-    """Discard the last run. The stamp is removed first, so that it counts as not run from here on."""
-    (folders.executed / f"{name}.json").unlink(missing_ok=True)
-    (folders.executed / f"{name}.ipynb").unlink(missing_ok=True)
+def _discard(name: str, folders: Folders, to_come: Sequence[str] = ()) -> None:
+    """Remove what the last run made; from here on it counts as not run.
+
+    A stamp without a key names what was made and what comes in its place, however this ends.
+    """
+    stamp = folders.executed / f"{name}.json"
+    made = _listed(stamp)
+    write_json(stamp, {"key": {}, "outputs": dict.fromkeys([*to_come, *made])})
+    remove_inside(folders.root, made)
     for leftover in (folders.executed / "failed").glob(f"{name}.*"):
         leftover.unlink()
-    shutil.rmtree(folders.results / name, ignore_errors=True)
+    results = folders.results / name
+    for folder in sorted([results, *results.rglob("*")], reverse=True):
+        with suppress(OSError):  # a file, or not empty
+            folder.rmdir()
+    if not to_come:
+        stamp.unlink()
 
 
 def _keep_failed(copy: Path, staging: Path, folders: Folders) -> str:

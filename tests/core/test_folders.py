@@ -10,8 +10,8 @@ import time
 import pytest
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import write_bytes
-from hicp_lib.core.folders import listed, locked_folder
+from hicp_lib.core.files import atomic_path, remove_left, write_bytes
+from hicp_lib.core.folders import filled_folder, listed, locked_folder
 
 
 def test_lists_pass_over_hidden_files_and_sort_numbers_as_numbers(tmp_path):
@@ -64,13 +64,49 @@ def test_a_folder_made_for_nothing_goes_again(tmp_path):
         pass
 
 
-def test_old_temporary_files_go_and_those_in_use_stay(tmp_path):
-    old, new, mine = (
-        tmp_path / "images" / name for name in (".partial-" + 16 * "0", ".partial-" + 16 * "1", ".partial")
-    )
-    for path in (old, new, mine):
+def test_what_killed_writers_left_goes_and_what_is_written_stays(tmp_path):
+    names = (".partial-" + 16 * "0", ".partial-" + 16 * "1", ".partial")
+    left, old, mine = (tmp_path / "images" / name for name in names)
+    for path in (left, mine):
         write_bytes(path, b"half")
-    for path in (old, mine):
-        os.utime(path, (0, 0))
-    with locked_folder(tmp_path):
-        assert [path.exists() for path in (old, new, mine)] == [False, True, True]
+    (old / "rgb").mkdir(parents=True)
+    with atomic_path(tmp_path / "a.txt") as written, filled_folder(tmp_path / "new") as inner:
+        (inner / "b.txt").write_text("b")
+        written.write_text("a")
+        with locked_folder(tmp_path):
+            assert [path.exists() for path in (left, old, mine)] == [False, False, True]
+    assert (tmp_path / "a.txt").read_text() == "a" and os.listdir(tmp_path / "new") == ["b.txt"]
+
+
+def test_without_locks_only_old_temporary_files_go(tmp_path, monkeypatch):
+    fcntl = pytest.importorskip("fcntl")
+    monkeypatch.setattr(fcntl, "flock", lambda *_: os.open(tmp_path / "no lock", os.O_RDONLY))
+    old, new = (tmp_path / (".partial-" + 16 * digit) for digit in "01")
+    for path in (old, new):
+        write_bytes(path, b"half")
+    os.utime(old, (0, 0))
+    remove_left(tmp_path)
+    assert [path.exists() for path in (old, new)] == [False, True]
+
+
+def test_a_folder_is_filled_wholly_or_not_at_all(tmp_path):
+    out = tmp_path / "out"
+    for hidden in ([], [".DS_Store"]):
+        for name in hidden:
+            out.mkdir()
+            (out / name).touch()
+        with pytest.raises(OSError, match=r"out/a\.txt'$"), filled_folder(out) as inner:
+            (inner / "b.txt").write_text("b")
+            (inner / "a.txt").touch(exist_ok=False)
+            os.open(inner / "a.txt", os.O_CREAT | os.O_EXCL)
+        with pytest.raises(InputError, match=rf"^{out}/a is none$"), filled_folder(out) as inner:
+            raise InputError(f"{inner}/a is none")
+        assert (os.listdir(out) if out.exists() else []) == hidden
+    with filled_folder(out) as inner:
+        (inner / "images").mkdir()
+        (inner / "images" / "1.png").touch()
+        (inner / "a.txt").touch()
+        assert listed(out) == []
+    assert listed(out) == ["a.txt", "images"] and listed(out / "images") == ["1.png"]
+    with pytest.raises(InputError, match="out: is there already"), filled_folder(out):
+        pass

@@ -6,11 +6,12 @@ import os
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 
 from hicp_lib.core import limited
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.limited import limited_child, raised
+from hicp_lib.core.limited import limited_child, limited_parts, raised
 
 
 def answer(path, *more):
@@ -55,6 +56,20 @@ def err(path):
     raise KeyError("header")
 
 
+def count(path, n, end):
+    """Computes for longer in all than it may at one thing."""
+    for k in range(n):
+        start_s = time.process_time()
+        while time.process_time() < start_s + 0.2:
+            pass
+        yield bytes([k]) * 100_000
+    {"refuses": refuse, "crashes": crash, "goes": leave, "is done": str}[end](path)
+
+
+def leave(path):
+    os._exit(0)
+
+
 @pytest.fixture
 def file(tmp_path):
     path = tmp_path / "a.bin"
@@ -70,13 +85,35 @@ def test_what_it_answers_and_refuses(file):
 
 
 @pytest.mark.parametrize(
+    ("end", "said"),
+    [("refuses", "a.bin: is none"), ("crashes", "gave up .SIGABRT."), ("goes", "gave up"), ("is done", "")],
+)
+def test_parts_come_one_by_one_and_then_what_is_wrong(file, monkeypatch, end, said):
+    monkeypatch.setenv("HICP_LIMITS", "0.1")
+    parts = limited_parts(file, count, 3, end)
+    for k in range(3):
+        assert next(parts) == bytes([k]) * 100_000
+    with pytest.raises(InputError, match=said) if said else pytest.raises(StopIteration):
+        next(parts)
+
+
+def test_who_has_enough_parts_ends_the_process(file):
+    parts = limited_parts(file, count, 10**6, "is done")
+    assert next(parts)
+    process = psutil.Process().children()
+    parts.close()
+    assert process and not any(one.is_running() for one in process)
+
+
+@pytest.mark.parametrize(
     ("function", "said"),
     [
-        (spin, "a.bin: reading takes more than 0 s; .*HICP_LIMITS=4"),
+        (spin, "a.bin: reading takes more than 0.4 s; .*HICP_LIMITS=4"),
         (never_end, "a.bin: reading takes more than"),
         (grow, "a.bin: reading takes more than 0.08. GB of memory; .*HICP_LIMITS=4"),
         (crash, "a.bin: its reader gave up .SIGABRT."),
         (err, "a.bin: its reader gave up .KeyError: 'header'."),
+        (leave, "a.bin: its reader gave up"),
     ],
 )
 def test_what_it_cannot_tell_is_told_in_one_line(file, monkeypatch, function, said):

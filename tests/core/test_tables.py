@@ -30,6 +30,13 @@ def test_csv_that_is_no_such_table_is_refused_in_one_line(tmp_path, case):
     assert message.startswith(str(path)) and "\n" not in message and len(message) < 600
 
 
+@pytest.mark.filterwarnings("error")
+def test_numbers_of_csv_are_read_to_the_last_bit_and_without_a_warning(tmp_path):
+    numbers = np.random.default_rng(0).uniform(0, 1000, 10_000)
+    pd.DataFrame({"a": numbers}).to_csv(tmp_path / "t.csv", index=False)
+    assert read_table(tmp_path / "t.csv", ["a"])["a"].tolist() == numbers.tolist()
+
+
 def test_parquet_is_read_where_its_columns_are_there_once(tmp_path):
     path = tmp_path / "t.parquet"
     columns = [pa.array([1]), pa.array([2]), pa.array([3])]

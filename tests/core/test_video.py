@@ -1,9 +1,12 @@
 """Videos: every frame, in its order, with its time."""
 
+import os
+
 import cv2
 import numpy as np
 import pytest
 
+from hicp_lib.core import video
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.video import open_video
 
@@ -40,3 +43,20 @@ def test_what_is_no_video_is_refused(tmp_path):
     path.write_bytes(b"no video")
     with pytest.raises(InputError, match=r"clip\.mp4: is not a video"):
         open_video(path)
+
+
+def test_a_decoder_that_crashes_is_told_in_one_line_after_the_frames_before(tmp_path, monkeypatch):
+    path = tmp_path / "clip.avi"
+    write_video(path)
+    monkeypatch.setattr(video, "_decode", decode_and_crash)
+    _, frames = open_video(path)
+    assert next(frames)[1].shape == (48, 64, 3)
+    with pytest.raises(InputError, match=r"clip\.avi: its reader gave up .SIGABRT."):
+        next(frames)
+
+
+def decode_and_crash(path):
+    parts = video._decode(path)
+    yield next(parts)
+    yield next(parts)
+    os.abort()

@@ -32,21 +32,24 @@ def main() -> int:
     else:
         kinds = tuple(asked.wanted) or tuple(mutated.COMMANDS)
         cases = list(mutated.cases(asked.mutated, asked.seed, kinds))
-    n, fell, cpu_s, start_s = Counter[str](), Counter[str](), 0.0, time.monotonic()
+    n, fell, refused = Counter[str](), Counter[str](), Counter[str]()
+    cpu_s, start_s = 0.0, time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         judge = Judge(Path(folder), weights_dir())
         for case in cases:
             told = judge.faults(case)
             n[case.kind] += 1
+            refused[case.kind] += not told and judge.used["status"] != 0
             cpu_s += judge.used["cpu_s"]
             if told:
                 fell[case.kind] += 1
                 print(f"FELL {case.name}\n       " + "\n       ".join(map(ascii, told)), flush=True)
         judge.close()
     for kind, of in n.items():
-        print(f"{kind:<20} {of:>4} cases, {fell[kind]:>3} fell")
+        right = of - refused[kind] - fell[kind]
+        print(f"{kind:<20} {of:>4} cases: {refused[kind]:>4} refused, {right:>4} right, {fell[kind]:>3} fell")
     took = f"{cpu_s:.0f} s of a processor, {time.monotonic() - start_s:.0f} s in all"
-    print(f"{len(cases)} cases, {fell.total()} fell; {took}")
+    print(f"{len(cases)} cases, {refused.total()} refused, {fell.total()} fell; {took}")
     return bool(fell)
 
 

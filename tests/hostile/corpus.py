@@ -15,11 +15,13 @@ from tests.hostile import (
     recordings,
     servers,
     special_files,
+    videos,
 )
 from tests.hostile.case import Case, unique
 
 MODULES = (
-    special_files, images, annotations, recordings, networks, servers, names, options, destroying, planted,
+    special_files, images, videos, annotations, recordings, networks, servers, names, options, destroying,
+    planted,
 )  # fmt: skip
 
 

@@ -103,6 +103,10 @@ def _mine_stays(*names: str) -> Callable[[Path, str], str | None]:
     return check
 
 
+def _absent(name: str, folder: Path, printed: str) -> str | None:
+    return f"{name} is left half-filled" if (folder / name).exists() else None
+
+
 def _inputs_within(folder: Path) -> None:
     (folder / "out").mkdir()
     for name in ("pictures", "annotations.json"):
@@ -132,13 +136,16 @@ def cases() -> Iterator[Case]:
             yield Case(
                 f"destroying: {filler}: into {kind}", command.replace("TARGET", "target"), made, notes=True
             )
+        hidden, command_out = partial(_mine_in, "out/.DS_Store"), command.replace("TARGET", "out")
+        yield Case(f"destroying: {filler}: beside .DS_Store", command_out, hidden, notes=True, exits=(0,))
         for place in PLACES:
             made = partial(_mine_in, f"out/{place}")
             name = f"destroying: {filler}: beside {place}"
             yield Case(name, command.replace("TARGET", "out"), made, notes=True, exits=(0, 2))
         if may_mount() and filler not in ("render", "simulate"):  # which render for seconds before they write
             full = command.replace("TARGET", f"{FULL_DISK}/x")
-            yield Case(f"destroying: {filler}: onto a full disk", full, _full_disk, notes=True)
+            gone = None if filler == "create" else partial(_absent, f"{FULL_DISK}/x")  # which goes on there
+            yield Case(f"destroying: {filler}: onto a full disk", full, _full_disk, notes=True, check=gone)
     for places in ("rec", "open3d", "pictures", "."):
         for filler in ("import open3d", "import bag", "draw PNG"):
             if (places, filler) != (".", "draw PNG"):

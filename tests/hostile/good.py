@@ -11,6 +11,7 @@ import pandas as pd
 
 from hicp_lib.core.keypoints import NAMES
 from hicp_lib.recordings.qualisys import MotionCapture, write_tsv
+from tests.core.test_video import write_video
 from tests.detectors.onnx.onnx_models import colour_maps_model
 from tests.recordings.c3d_files import make_c3d
 from tests.recordings.conftest import write_small
@@ -76,6 +77,7 @@ def make_good(folder: Path) -> Path:
     _other_tools(folder)
     _recordings(folder)
     colour_maps_model(folder / "model.onnx", (192, 256), 133)
+    write_video(folder / "clip.avi")
     curves = {"detector": "d", "group": "body", "score": [0.0, 1.0], "hit_rate": [0.1, 0.9]}
     pd.DataFrame(curves).to_csv(folder / "calibrations.csv", index=False)
     return folder
@@ -118,6 +120,8 @@ def _recordings(folder: Path) -> None:
 READERS: dict[str, tuple[str, str]] = {
     "pictures": (f"{DETECT} --out out.json", "pictures/b.jpg"),
     "detect folder": (f"{DETECT} --out out.json", "pictures"),
+    "video": ("detect --detector movenet-lightning --images clip.avi --out out.json", "clip.avi"),
+    "inspect video": ("inspect clip.avi", "clip.avi"),
     "detect dataset": (
         "detect --detector movenet-lightning --dataset set --out out.json",
         "set/annotations.json",

@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 
 from tests.hostile.case import Case
-from tests.hostile.good import DETECT, EVALUATE, picture
+from tests.hostile.good import DETECT, EVALUATE, READERS, picture
 
 _EXTREMES = [struct.pack(f, v) for f, v in (
     ("<I", 0), ("<I", 2**32 - 1), (">I", 2**31 - 1), ("<Q", 2**63 - 1), ("<H", 65535), ("<f", float("nan")),
@@ -29,6 +29,7 @@ COMMANDS = {
         ("x.bag", "inspect x.bag"),
     ],
     "c3d": [("mocap.c3d", "inspect mocap.c3d")],
+    "video": [("clip.avi", READERS["video"][0]), ("clip.avi", "inspect clip.avi")],
     "json": [
         ("annotations.json", "inspect annotations.json"),
         ("results.json", f"{EVALUATE} --group body"),

@@ -79,6 +79,16 @@ def endless_loop() -> bytes:
     return network(nodes, ZERO | {"n": np.array(2**62), "true": np.array(True)})
 
 
+def products(n: int, side: int) -> bytes:
+    """Products of constants, which are computed when the network is opened."""
+    names = ["big", *(f"n{k}" for k in range(n))]
+    nodes = [node("ConstantOfShape", ["shape"], ["big"])]
+    nodes += [node("MatMul", [a, "big"], [b]) for a, b in zip(names, names[1:], strict=False)]
+    nodes += [node("ReduceMax", [names[-1]], ["most"]), node("ReduceMax", ["image"], ["seen"]),
+              node("Add", ["most", "seen"], ["sum"]), node("Add", ["sum", "zero"], ["maps"])]  # fmt: skip
+    return network(nodes, ZERO | {"shape": np.array([side, side])})
+
+
 def cyclic() -> bytes:
     return network(
         [
@@ -147,6 +157,7 @@ NETWORKS: dict[str, Callable[[], bytes]] = {
     "the picture a million times": partial(tiled, 1000),
     "a range of 1e10": ranged,
     "a loop without end": endless_loop,
+    "products of constants": partial(products, 20, 4096),
     "a circle": cyclic,
     "300,000 nodes": partial(many_nodes, 300_000),
     "doubled 40 times": partial(doubled, 40),

