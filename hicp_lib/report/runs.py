@@ -2,8 +2,8 @@
 
 A run happens in a staging folder. It replaces the last one only if every cell completed, nothing was written
 to stderr, and the results have the run's parameters; its stamp is written last. Without a stamp, with another
-key, or if an output differs from the stamped one, the notebook runs again. Other files beside the outputs, such
-as a user's notes, stay.
+key, or if an output differs from the stamped one, the notebook runs again. Other files beside the outputs,
+such as a user's notes, stay.
 """
 
 import json
