@@ -1,6 +1,6 @@
 """Figures of doses: what was varied, and how detection falls with it."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,6 @@ _UNITS = {"distance": "{:g} m", "resolution": "{:g} px"}
 _LOGARITHMIC = ("light", "resolution", "distance")
 _GROUPS = {"body": "Bodies", "hand": "Hands"}
 _MEASURES = {"AP": "average precision", "visible keypoints hit": "share of visible keypoints hit"}
-_SUBSET_PENS = {"headless": {"ls": "--", "mfc": "white"}}
 
 
 @in_style
@@ -74,50 +73,31 @@ def dose_curves(table: pd.DataFrame, group: str, measure: str = "AP") -> Figure:
         One of `hicp_lib.evaluation.failures.dose_curves.MEASURES`.
     """
     table = table[table["group"] == group]
-    rows = table[table["measure"] == measure].assign(subset="")
+    rows = table[table["measure"] == measure].astype({"low": float, "high": float})
     rows = marks.own_bodies(rows) if group == "body" else rows
-    figure = _dose_panels(rows, _MEASURES[measure], _LOGARITHMIC)
-    known = rows.dropna(subset="value")
-    lowest = known.loc[known.groupby("detector", sort=False)["value"].idxmin()]
-    told = {"measure": _MEASURES[measure], "group": _GROUPS[group], "said": lowest}
-    return Figure(figure, *texts("dose_curves", **told), table)
-
-
-@in_style
-def observed_curves(table: pd.DataFrame, note: str) -> Figure:
-    """Hit rate against doses as the data set has them; `table` from `dose_curves.observed_curves`."""
-    rows = marks.own_bodies(table)
-    ends = rows.groupby(["detector", "dose", "subset"], sort=False)["value"].agg(["first", "last"])
-    change = (ends["last"] - ends["first"]).rename("change").reset_index()
-    largest = change.loc[change["change"].abs().groupby(change["detector"], sort=False).idxmax()]
-    figure = _dose_panels(rows, "share of hits")
-    return Figure(figure, *texts("observed_curves", note=note, said=largest), table)
-
-
-def _dose_panels(table: pd.DataFrame, ylabel: str, logarithmic: Collection[str] = ()):
-    """A panel per dose, with a line and its interval for each detector and subset."""
-    doses = table["dose"].unique()
-    n_rows = -(-len(doses) // 2)
+    n_rows = -(-rows["dose"].nunique() // 2)
     figure, axes = new_figure(n_rows, 2, WIDTH_IN, 1.9 * n_rows + 0.5, sharey=True, squeeze=False)
-    for axis, dose in zip(axes.flat, doses, strict=False):
-        of_dose = table[table["dose"] == dose].astype({"low": float, "high": float})
-        for (detector, subset), part in of_dose.groupby(["detector", "subset"], sort=False):
-            part, pen = part.sort_values("level"), {"color": detector_colour(detector), "ms": 5}
-            pen |= {"marker": detector_marker(detector), "label": f"{detector} {subset}".strip()}
-            axis.plot(part["level"], part["value"], **pen | _SUBSET_PENS.get(subset, {}))
-            axis.fill_between(part["level"], part["low"], part["high"], color=pen["color"], alpha=0.13, lw=0)
+    for axis in axes.flat[rows["dose"].nunique() :]:
+        axis.set_axis_off()
+    for axis, (dose, of_dose) in zip(axes.flat, rows.groupby("dose", sort=False), strict=False):
+        for detector, part in of_dose.groupby("detector", sort=False):
+            part, colour = part.sort_values("level"), detector_colour(detector)
+            pen = {"marker": detector_marker(detector), "ms": 5, "label": detector}
+            axis.plot(part["level"], part["value"], color=colour, **pen)
+            axis.fill_between(part["level"], part["low"], part["high"], color=colour, alpha=0.13, lw=0)
         axis.set(ylim=(-0.03, 1.03))
         axis.set_xlabel(TEXTS["doses"].get(dose, dose), fontsize=9)
-        if dose in logarithmic:
+        if dose in _LOGARITHMIC:
             ticks = np.unique(of_dose["level"])
             axis.set_xscale("log")
             axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
-    for axis in axes.flat[len(doses) :]:
-        axis.set_axis_off()
-    figure.supylabel(ylabel, fontsize=10)
+    figure.supylabel(_MEASURES[measure], fontsize=10)
     marks.legend_below(figure, axes[0, 0], ncols=2)
-    return figure
+    known = rows.dropna(subset="value")
+    lowest = known.loc[known.groupby("detector", sort=False)["value"].idxmin()]
+    told = {"measure": _MEASURES[measure], "group": _GROUPS[group], "said": lowest}
+    return Figure(figure, *texts("dose_curves", **told), table)
 
 
 @in_style
