@@ -72,6 +72,13 @@ def test_a_table_is_saved_exactly_with_the_parameters_of_its_run(study, shown):
     assert stamp["parameters"]["seed"] == 3
 
 
+def test_a_table_may_be_shown_in_short_and_is_saved_whole(study, shown):
+    table = pd.DataFrame({"detector": ["a"], "value": [0.25], "low": [0.125]})
+    study.table("t", table, "A table.", shown=pd.DataFrame({"detector": ["a"], "AP": ["0.25 [0.12, 0.5]"]}))
+    assert "0.25 [0.12, 0.5]" in shown[0] and ">low<" not in shown[0]
+    pd.testing.assert_frame_equal(pd.read_parquet(study.folder / "t.parquet"), table)
+
+
 def test_values_are_json_and_finite(study, shown):
     study.value("n", np.int64(3))
     study.value("many", np.array([1.5, 2]))

@@ -25,7 +25,7 @@ STATES = ("visible", "hidden", "outside", "unknown")
 BORDER = 0.05  # fraction of the picture's side that counts as its border
 _SIGMAS = SIGMAS["halpe"][COCO_17]
 _DTYPES = {
-    "subset": str, "detector": str, "image_id": int, "source_image": int, "cut_side": str, "keypoint": int,
+    "subset": str, "detector": str, "image_id": int, "source_image": int, "keypoint": int,
     "state": str, "given": bool, "score": float, "x": float, "y": float, "hit": float,
 }  # fmt: skip
 
@@ -45,9 +45,9 @@ def placed_keypoints(truth: Truth, found: Found, source: Annotations) -> pd.Data
     Returns
     -------
     DataFrame
-        Columns `subset, detector, image_id, source_image, cut_side` (empty outside Headless), `keypoint,
-        state` (one of `STATES`), `given, score` (NaN if not given), `x, y` (its given position, from 0 at the
-        left or top border to 1 at the other), `hit` (OKS term of at least .5; NaN if not given or unknown).
+        Columns `subset, detector, image_id, source_image, keypoint, state` (one of `STATES`), `given, score`
+        (NaN if not given), `x, y` (its given position, from 0 at the left or top border to 1 at the other),
+        `hit` (OKS term of at least .5; NaN if not given or unknown).
     """
     seen = {subset: with_outside(people, source) for subset, people in truth.items()}
     parts = [_of_case(seen[subset], run, subset, detector) for (subset, detector), run in found.items()]
@@ -79,7 +79,6 @@ def _of_case(people: Annotations, run: Mapping[int, Detections], subset: str, de
     of_person = {
         "subset": subset, "detector": detector, "image_id": people.image_ids[who],
         "source_image": [sources[image.id] for image in images],
-        "cut_side": [people.extras[i].get("cut_side", "") for i in who.tolist()],
     }  # fmt: skip
     of_keypoint = {
         "keypoint": np.broadcast_to(COCO_17, flags.shape), "state": state, "given": given,
@@ -97,15 +96,3 @@ def landed(placed: pd.DataFrame) -> pd.Series:
     depth = np.minimum(np.minimum(x, 1 - x), np.minimum(y, 1 - y))
     place = np.select([depth < 0, depth < BORDER], ["outside", "at the border"], "inside")
     return pd.Series(place, index=placed.index).where(placed["given"])
-
-
-def from_the_cut(placed: pd.DataFrame) -> pd.DataFrame:
-    """Positions in Headless, rotated so that the cut is at the top: columns `along`, `below`.
-
-    `along` runs from 0 to 1 along the cut and `below` from 0 at the cut to 1 at the far side; it is negative
-    in the removed part.
-    """
-    x, y, side = placed["x"], placed["y"], placed["cut_side"]
-    along = np.where(side.isin(["top", "bottom"]), x, y)
-    below = np.select([side == "top", side == "bottom", side == "left"], [y, 1 - y, x], 1 - x)
-    return pd.DataFrame({"along": along, "below": below}, index=placed.index)

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from hicp_lib.core.keypoints import NAMES
-from hicp_lib.evaluation.failures.placed_keypoints import from_the_cut, landed
+from hicp_lib.evaluation.failures.placed_keypoints import landed
 from hicp_lib.evaluation.statistics.proportions import proportions
 from hicp_lib.evaluation.statistics.resampling import Draws
 
@@ -55,10 +55,7 @@ def change_per_keypoint(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.Data
 
 
 def hallucinated_heads(placed: pd.DataFrame) -> pd.DataFrame:
-    """Head keypoints given in Headless, where there is no head: their rows of `placed_keypoints`.
-
-    Further columns: `landed`, and `along`, `below` as from `from_the_cut`.
-    """
+    """Head keypoints given in Headless, where there are none: rows of `placed_keypoints` with `landed`."""
     rows = placed[(placed["subset"] == "headless") & placed["keypoint"].isin(HEAD_POINTS) & placed["given"]]
     rows = rows[rows["state"].isin(["outside", "unknown"])]
-    return rows.assign(landed=landed(rows), **from_the_cut(rows))
+    return rows.assign(landed=landed(rows))

@@ -10,6 +10,8 @@
 Equal cases are ordered by their ids; of each source image only the worst case is used.
 """
 
+from collections import Counter
+
 import numpy as np
 import pandas as pd
 
@@ -33,7 +35,8 @@ def worst_cases(errors: pd.DataFrame, n: int = 4) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns `detector, case, rank` (from 1), `subset, image_id, badness`.
+        Columns `detector, case, rank` (from 1), `subset, image_id, badness, mistakes` (in words: of what kind
+        how many, or how many keypoints can be seen).
     """
     body = errors[errors["group"] == "body"]
     mistakes = body["score"].where(body["kind"].isin(WRONG), 0.0)
@@ -45,10 +48,18 @@ def worst_cases(errors: pd.DataFrame, n: int = 4) -> pd.DataFrame:
     table = table[table["badness"] > 0].sort_values("badness", ascending=False, kind="stable")
     table = table.drop_duplicates(["detector", "case", "source_image"])
     table = table.assign(rank=table.groupby(["detector", "case"]).cumcount() + 1)
+    wrong = body[body["kind"].isin(WRONG)].groupby(keys)["kind"].agg(_counted)
+    table = table.join(wrong.astype(str).rename("mistakes"), on=keys)
+    seen = table["badness"].astype(int).astype(str) + " visible keypoints"
+    table["mistakes"] = table["mistakes"].where(table["case"] == KINDS_OF_CASE[0], seen)
     orders = {"detector": list(dict.fromkeys(errors["detector"])), "case": list(KINDS_OF_CASE)}
     place = table["rank"], *(table[name].map(orders[name].index) for name in ("case", "detector"))
-    columns = ["detector", "case", "rank", "subset", "image_id", "badness"]
+    columns = ["detector", "case", "rank", "subset", "image_id", "badness", "mistakes"]
     return table.iloc[np.lexsort(place)].query("rank <= @n")[columns].reset_index(drop=True)
+
+
+def _counted(kinds: pd.Series) -> str:
+    return ", ".join(f"{kind} × {n}" for kind, n in Counter(kinds).most_common())
 
 
 def lost_points(errors: pd.DataFrame) -> pd.DataFrame:

@@ -11,19 +11,22 @@ import pandas as pd
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.files import read_json
 from hicp_lib.core.images import read_image
-from hicp_lib.core.keypoints import BODY, COCO_17, FACE, HANDS, LEFT_HAND, LIMBS, NAMES, RIGHT_HAND, TO_HALPE
+from hicp_lib.core.keypoints import BODY, COCO_17, FACE, HANDS, INDEX, LEFT_HAND, LIMBS, TO_HALPE
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.simulation.body.joints import pose_from_joints, radians
 from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.evaluation import WIDTH_IN
 from hicp_lib.study.plots.palette import BODY_COLOUR, HEAD_COLOUR, SUBSET_COLOURS
 from hicp_lib.study.plots.people import draw_truth, picture_grid
 from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
 
 _TRUTH_COLOUR = "#F0E442"
 _EDGES = ("left", "top", "right", "bottom")
-_PARTS: dict[str, Any] = {NAMES[i].replace("_", " "): [i] for i in COCO_17}
-_PARTS |= {"face (68)": FACE, "left hand (21)": LEFT_HAND, "right hand (21)": RIGHT_HAND}
+_PAIRS = ("eye", "ear", "shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+_PARTS: dict[str, Any] = {"nose": [INDEX["nose"]]}
+_PARTS |= {f"{part}s": [INDEX[f"left_{part}"], INDEX[f"right_{part}"]] for part in _PAIRS}
+_PARTS |= {"face (68 points)": FACE, "hands (42 points)": HANDS}
 
 
 def with_truth(annotations: Annotations, images_dir: str | Path, image_id: int) -> np.ndarray:
@@ -45,7 +48,7 @@ def with_truth(annotations: Annotations, images_dir: str | Path, image_id: int) 
 
 
 def scenes(annotations: Annotations, images_dir: str | Path, image_ids: Sequence[int], note: str) -> Figure:
-    """Whole images (upper row) and the same with their annotated keypoints (lower row).
+    """Whole images with their annotated keypoints, two abreast.
 
     Parameters
     ----------
@@ -56,11 +59,10 @@ def scenes(annotations: Annotations, images_dir: str | Path, image_ids: Sequence
     note : str
         What the data are, for the caption.
     """
-    plain = [read_image(Path(images_dir) / annotations.images[i].file_name) for i in image_ids]
-    marked = [with_truth(annotations, images_dir, i) for i in image_ids]
+    pictures = [with_truth(annotations, images_dir, i) for i in image_ids]
     n_people = [str((annotations.image_ids == i).sum()) for i in image_ids]
-    said = texts("scenes", note=note, n=len(plain), n_people=n_people)
-    return picture_grid([plain, marked], *said, row_titles=["image", "annotated"], cell_in=10 / len(plain))
+    said = texts("scenes", note=note, n=len(pictures), n_people=n_people)
+    return picture_grid([pictures[k : k + 2] for k in range(0, len(pictures), 2)], *said, cell_in=2.8)
 
 
 @in_style
@@ -78,7 +80,7 @@ def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
     note : str
         What the data are, for the caption.
     """
-    figure, axes = new_figure(1, len(table), 2.6 * len(table), 3.8, squeeze=False)
+    figure, axes = new_figure(1, len(table), WIDTH_IN, 0.5 * WIDTH_IN, squeeze=False)
     for axis, (_, row) in zip(axes[0], table.iterrows(), strict=True):
         left, top, right, bottom = row[[f"basic_crop_{edge}_px" for edge in _EDGES]].astype(int)
         image = read_image(Path(images_dir) / row["file_name"])[top:bottom, left:right]
@@ -87,10 +89,16 @@ def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
             _draw_box(axis, row, part, colour)
         _draw_cut(axis, row)
         axis.set(xticks=[], yticks=[], xlim=(left - 0.5, right - 0.5), ylim=(bottom - 0.5, top - 0.5))
-        axis.set_title(f"person {row['annotation_id']}", fontsize=9)
         axis.grid(False)
-    sides = table["cut_side"].astype(str).tolist()
-    return Figure(figure, *texts("head_cuts", note=note, n=len(table), sides=sides), table)
+    whole, kept = (_areas_px2(table, f"{subset}_crop") for subset in ("basic", "headless"))
+    sides = [f"{side} for {n}" for side, n in table["cut_side"].value_counts().items()]
+    gone = {"least": (1 - kept / whole).min(), "most": (1 - kept / whole).max()}
+    return Figure(figure, *texts("head_cuts", note=note, n=len(table), sides=sides, **gone), table)
+
+
+def _areas_px2(table: pd.DataFrame, box: str) -> pd.Series:
+    left, top, right, bottom = (table[f"{box}_{edge}_px"] for edge in _EDGES)
+    return (right - left) * (bottom - top)
 
 
 def _draw_box(axis, row: pd.Series, part: str, colour: str) -> None:
@@ -123,13 +131,17 @@ def pairs(subsets: Mapping[str, tuple[Annotations, Path]], image_ids: Sequence[i
         [with_truth(annotations, images_dir, i) if i in annotations.images else None for i in image_ids]
         for annotations, images_dir in subsets.values()
     ]
-    said = texts("pairs", subsets=list(subsets), note=note, n=len(image_ids))
-    return picture_grid(rows, *said, row_titles=list(subsets), cell_in=10 / len(image_ids))
+    of = {
+        name: people.visibility[np.isin(people.image_ids, image_ids)] for name, (people, _) in subsets.items()
+    }
+    labelled = pd.Series({name: (flags[:, COCO_17] > 0).sum(axis=1).mean() for name, flags in of.items()})
+    said = texts("pairs", subsets=list(subsets), note=note, n=len(image_ids), labelled=labelled)
+    return picture_grid(rows, *said, row_titles=list(subsets), cell_in=WIDTH_IN / len(image_ids))
 
 
 @in_style
 def labelled_share(subsets: Mapping[str, Annotations], note: str) -> Figure:
-    """Share of people in whom a part is labelled; for face and hands, the mean over their points."""
+    """Share of people in whom a part is labelled; left and right together, of face and hands the mean."""
     visible = {name: data.visibility[~data.is_crowd] > 0 for name, data in subsets.items()}
     table = pd.DataFrame(
         {"part": part, "subset": name, "share": float(labelled[:, indices].mean())}
@@ -137,17 +149,14 @@ def labelled_share(subsets: Mapping[str, Annotations], note: str) -> Figure:
         for part, indices in _PARTS.items()
         if len(labelled)
     )
-    figure, axis = new_figure(1, 1, 9.0, 3.6)
-    wide = table.pivot(index="part", columns="subset", values="share")
-    wide = wide.reindex(list(_PARTS), columns=list(subsets))
-    for k, name in enumerate(subsets):
-        x = np.arange(len(wide)) + marks.offset(k, len(subsets), 0.4)
-        axis.bar(x, wide[name], 0.38, color=SUBSET_COLOURS.get(name), label=name)
-    axis.set_xticks(np.arange(len(wide)), wide.index, rotation=50, ha="right")
-    axis.set(ylabel="share of people", ylim=(0, 1))
-    axis.grid(axis="x", visible=False)
-    axis.legend(loc="upper right", ncols=2, bbox_to_anchor=(1, 1.16))
-    return Figure(figure, *texts("labelled_share", note=note, said=wide.mean()), table)
+    figure, axis = new_figure(1, 1, WIDTH_IN, 3.8)
+    pens, parts = marks.subset_dots(subsets), list(_PARTS)
+    marks.dots_in_rows(axis, table, "part", "subset", parts, pens, bounds=["share"] * 3, capsize=0)
+    axis.set(xlabel="share of people", xlim=(-0.02, 1.02))
+    marks.name_rows(axis, parts)
+    marks.legend_below(figure, axis)
+    least = table.sort_values("share", kind="stable").drop_duplicates("subset")
+    return Figure(figure, *texts("labelled_share", note=note, said=least), table)
 
 
 @in_style
@@ -163,17 +172,20 @@ def crop_sizes(table: pd.DataFrame, min_pixels: int, note: str) -> Figure:
     note : str
         What the data are, for the caption.
     """
-    left, top, right, bottom = (table[f"basic_crop_{edge}_px"] for edge in _EDGES)
-    sizes = ((right - left) * (bottom - top)).to_numpy(float)
+    sizes = _areas_px2(table, "basic_crop").to_numpy(float)
     sizes = sizes[sizes > 0]
-    figure, axis = new_figure(1, 1, 7.5, 3.0)
+    figure, axis = new_figure(1, 1, WIDTH_IN, 2.6)
     bins = np.geomspace(max(sizes.min(), 1), sizes.max() * 1.01, 30)
     axis.hist(sizes[sizes >= min_pixels], bins, color=SUBSET_COLOURS["basic"], label="kept")
     axis.hist(sizes[sizes < min_pixels], bins, color="#BBBBBB", label="too small")
     axis.axvline(min_pixels, color="black", lw=1.2, ls="--")
-    axis.set(xscale="log", xlabel="pixels of the crop", ylabel="people")
+    axis.set(xscale="log", xlabel="area of the crop [px]", ylabel="people")
+    ticks = [n * 10**k for k in range(8) for n in (1, 3) if bins[0] <= n * 10**k <= bins[-1]]
+    axis.set_xticks(ticks, [f"{tick:,}" for tick in ticks])
+    axis.minorticks_off()
+    axis.yaxis.get_major_locator().set_params(integer=True)
     axis.legend(loc="best")
-    told = {"share": (sizes >= min_pixels).mean(), "median": np.median(sizes)}
+    told = {"small": int((sizes < min_pixels).sum()), "n": len(sizes), "median": np.median(sizes)}
     said = texts("crop_sizes", min_pixels=min_pixels, note=note, **told)
     return Figure(figure, *said, pd.DataFrame({"pixels": sizes}))
 

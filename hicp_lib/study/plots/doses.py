@@ -1,24 +1,31 @@
 """Figures of doses: what was varied, and how detection falls with it."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.evaluation import WIDTH_IN
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
-from hicp_lib.study.plots.people import picture_grid
-from hicp_lib.study.plots.style import TEXTS, Figure, in_lines, in_style, new_figure, texts
+from hicp_lib.study.plots.people import draw_detections, picture_grid, title_pictures
+from hicp_lib.study.plots.style import TEXTS, Figure, in_style, new_figure, texts
 
-_UNITS = {"distance": " m", "resolution": " px"}
+_UNITS = {"distance": "{:g} m", "resolution": "{:g} px"}
 _LOGARITHMIC = ("light", "resolution", "distance")
-_SUBSET_STYLES = {"basic": "-", "headless": "--", "close": ":"}
+_GROUPS = {"body": "Bodies", "hand": "Hands"}
+_MEASURES = {"AP": "average precision", "visible keypoints hit": "share of visible keypoints hit"}
 
 
-def dose_pictures(annotations: Annotations, folder: Path, person: int = 0) -> Figure:
-    """Every picture of one person, a row for each dose.
+@in_style
+def dose_pictures(
+    annotations: Annotations, folder: Path, found: Mapping[str, Mapping[int, Detections]], person: int = 0
+) -> Figure:
+    """Pictures of one person with what was detected, a row for each dose, five levels of each.
 
     Parameters
     ----------
@@ -26,93 +33,91 @@ def dose_pictures(annotations: Annotations, folder: Path, person: int = 0) -> Fi
         Of the doses' pictures; they say person, dose and level.
     folder : Path
         Holds `images`.
+    found : mapping of str to mapping of int to Detections
+        By image id, of every detector.
     person : int
     """
+    extras = pd.DataFrame(annotations.extras).assign(image_id=annotations.image_ids)
+    detectors = list(marks.own_bodies(pd.DataFrame({"detector": list(found)}))["detector"])
     rows: dict[str, list] = {}
-    for image_id, extra in zip(annotations.image_ids.tolist(), annotations.extras, strict=True):
-        if extra["source_image_id"] == person:
+    titles, n_found = [], dict.fromkeys(detectors, 0)
+    for dose, levels in extras[extras["source_image_id"] == person].groupby("dose", sort=False):
+        for k in np.unique(np.linspace(0, len(levels) - 1, 5).round().astype(int)):
+            image_id, level = int(levels["image_id"].iloc[k]), levels["level"].iloc[k]
             image = read_image(Path(folder) / "images" / annotations.images[image_id].file_name)
-            rows.setdefault(extra["dose"], []).append((extra["level"], image))
-    drawn = [[image for _, image in pictures] for pictures in rows.values()]
-    said = texts("dose_pictures", doses=list(rows))
-    figure = picture_grid(drawn, *said, row_titles=list(rows), cell_in=1.5)
-    columns = max(len(pictures) for pictures in rows.values())
-    for i, (dose, pictures) in enumerate(rows.items()):
-        for j, (level, _) in enumerate(pictures):
-            title = f"{level:g}{_UNITS.get(dose, '')}"
-            figure.figure.axes[i * columns + j].set_title(title, loc="center", fontsize=7, pad=2)
-    return figure
+            for detector in detectors:
+                people = found[detector].get(image_id, Detections.none())
+                image = draw_detections(image, people, detector)
+                n_found[detector] += len(people) > 0
+            rows.setdefault(dose, []).append(image)
+            titles.append(_UNITS.get(dose, "{:.0%}").format(level))
+    told = texts("dose_pictures", doses=list(rows), n=len(titles), seen=pd.Series(n_found))
+    drawn = picture_grid(list(rows.values()), *told, row_titles=list(rows), cell_in=1)
+    title_pictures(drawn, titles, 8)
+    marks.add_keys(drawn.figure.axes[0], detectors, {})
+    marks.legend_below(drawn.figure, drawn.figure.axes[0])
+    return drawn
 
 
 @in_style
-def dose_curves(table: pd.DataFrame, group: str) -> Figure:
-    """AP and hits of visible keypoints against each dose; `table` from `dose_curves.dose_curves`.
+def dose_curves(table: pd.DataFrame, group: str, measure: str = "AP") -> Figure:
+    """AP, or another measure, against each dose.
 
-    The numbers behind it have hits of hidden keypoints as well.
+    Parameters
+    ----------
+    table : pd.DataFrame
+        As from `hicp_lib.evaluation.failures.dose_curves.dose_curves`.
+    group : {"body", "hand"}
+        Of keypoints.
+    measure : str, optional
+        One of `hicp_lib.evaluation.failures.dose_curves.MEASURES`.
     """
     table = table[table["group"] == group]
-    rows = table[table["measure"] != "hidden keypoints hit"]
-    styles = dict.fromkeys(rows["measure"], ":") | {"AP": "-"}
-    labels = {measure: f", {measure}" for measure in styles} | {"AP": ""}
-    figure, axes = _dose_panels(rows, "measure", styles, labels, "AP, share of hits")
-    marks.legend_below(figure, axes[0, 0], ncols=2)
-    for axis, (dose, part) in zip(axes.flat, rows.groupby("dose", sort=False), strict=False):
+    rows = table[table["measure"] == measure].astype({"low": float, "high": float})
+    rows = marks.own_bodies(rows) if group == "body" else rows
+    n_rows = -(-rows["dose"].nunique() // 2)
+    figure, axes = new_figure(n_rows, 2, WIDTH_IN, 1.9 * n_rows + 0.5, sharey=True, squeeze=False)
+    for axis in axes.flat[rows["dose"].nunique() :]:
+        axis.set_axis_off()
+    for axis, (dose, of_dose) in zip(axes.flat, rows.groupby("dose", sort=False), strict=False):
+        for detector, part in of_dose.groupby("detector", sort=False):
+            part, colour = part.sort_values("level"), detector_colour(detector)
+            pen = {"marker": detector_marker(detector), "ms": 5, "label": detector}
+            axis.plot(part["level"], part["value"], color=colour, **pen)
+            axis.fill_between(part["level"], part["low"], part["high"], color=colour, alpha=0.13, lw=0)
+        axis.set(ylim=(-0.03, 1.03))
+        axis.set_xlabel(TEXTS["doses"].get(dose, dose), fontsize=9)
         if dose in _LOGARITHMIC:
-            ticks = np.unique(part["level"])
+            ticks = np.unique(of_dose["level"])
             axis.set_xscale("log")
             axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
-    lows = rows[rows["measure"] == "AP"].groupby(["detector", "dose"], sort=False)["value"].min()
-    return Figure(figure, *texts("dose_curves", said=lows), table)
-
-
-@in_style
-def observed_curves(table: pd.DataFrame, note: str) -> Figure:
-    """Hit rate against doses as the data set has them; `table` from `dose_curves.observed_curves`."""
-    subsets = table["subset"].unique()
-    styles = dict.fromkeys(subsets, "-.") | _SUBSET_STYLES
-    labels = {subset: f", {subset}" for subset in subsets}
-    figure, axes = _dose_panels(table, "subset", styles, labels, "share of hits")
-    marks.legend_below(figure, axes[0, 0], ncols=3)
-    spread = table.groupby(["detector", "dose"], sort=False)["value"].agg(np.ptp)
-    return Figure(figure, *texts("observed_curves", note=note, said=spread), table)
-
-
-def _dose_panels(table: pd.DataFrame, by: str, styles: dict, labels: dict, ylabel: str):
-    """A panel per dose, with a line and its interval for each detector and value of the column `by`."""
-    doses = table["dose"].unique()
-    columns = min(len(doses), 3)
-    rows = -(-len(doses) // columns)
-    figure, axes = new_figure(rows, columns, 3.7 * columns, 2.9 * rows + 0.5, sharey=True, squeeze=False)
-    for axis, dose in zip(axes.flat, doses, strict=False):
-        lines = table[table["dose"] == dose].groupby(["detector", by], sort=False)
-        for (detector, value), part in lines:
-            part, colour = part.sort_values("level"), detector_colour(detector)
-            pen = {"color": colour, "ls": styles[value], "label": f"{detector}{labels[value]}"}
-            axis.plot(part["level"], part["value"], marker=detector_marker(detector), ms=4, **pen)
-            bounds = part[["low", "high"]].astype(float)  # objects where there is no interval at all
-            axis.fill_between(part["level"], bounds["low"], bounds["high"], color=colour, alpha=0.13, lw=0)
-        axis.set(xlabel=TEXTS["doses"].get(dose, dose), ylim=(-0.02, 1.02))
-    for axis in axes.flat[len(doses) :]:
-        axis.set_axis_off()
-    for axis in axes[:, 0]:
-        axis.set(ylabel=ylabel)
-    return figure, axes
+    figure.supylabel(_MEASURES[measure], fontsize=10)
+    marks.legend_below(figure, axes[0, 0], ncols=2)
+    known = rows.dropna(subset="value")
+    lowest = known.loc[known.groupby("detector", sort=False)["value"].idxmin()]
+    told = {"measure": _MEASURES[measure], "group": _GROUPS[group], "said": lowest}
+    return Figure(figure, *texts("dose_curves", **told), table)
 
 
 @in_style
 def flicker_rates(table: pd.DataFrame, note: str) -> Figure:
     """Flicker rate and jitter as detected and filtered; `table` from `flicker.flicker`."""
-    measures = ("flicker rate", "jitter [px]")
-    detectors = list(table["detector"].unique())[::-1]
-    figure, axes = new_figure(1, len(measures), 9.0, 1.3 + 0.55 * len(detectors), sharey=True)
-    cases = {case: rows.set_index("detector") for case, rows in table.groupby(["tracks", "measure"])}
-    for axis, measure in zip(axes, measures, strict=True):
-        for y, (name, pen) in enumerate(marks.detector_dots(detectors).items()):
-            marks.dots(axis, cases["as detected", measure].loc[[name]], y + 0.13, **pen)
-            marks.dots(axis, cases["filtered", measure].loc[[name]], y - 0.13, **pen | {"mfc": "white"})
-        axis.set(xlabel=measure, xlim=(0, None), ylim=(-0.5, len(detectors) - 0.5))
-    axes[0].set(yticks=range(len(detectors)), yticklabels=list(map(in_lines, detectors)))
-    lag_ms = 1000 * cases["filtered", "latency [s]"]["value"]
-    rates = cases["as detected", "flicker rate"]["value"]
+    measures = {"flicker rate": 100, "jitter [px]": 1}
+    rows = marks.own_bodies(table)
+    detectors = list(rows["detector"].unique())
+    figure, axes, panels = marks.panels(
+        rows[rows["measure"].isin(measures)], ["measure"], WIDTH_IN, 1.2 + 0.5 * len(detectors), sharey=True
+    )
+    for axis, of_measure, measure in panels:
+        for name, pen in marks.detector_dots(detectors).items():
+            part = of_measure[of_measure["detector"] == name].sort_values("tracks")
+            for y, (_, row), fill in zip(
+                (-0.13, 0.13), part.groupby("tracks"), ({}, {"mfc": "white"}), strict=True
+            ):
+                marks.dots(axis, row, detectors.index(name) + y, factor=measures[measure], **pen | fill)
+        axis.set(xlabel=measure.replace("rate", "rate [%]"), xlim=(0, None))
+    marks.name_rows(axes[0, 0], detectors)
+    cases = rows.set_index(["tracks", "measure", "detector"])["value"].sort_index()
+    lag_ms, rates = 1000 * cases["filtered", "latency [s]"], 100 * cases["as detected", "flicker rate"]
     return Figure(figure, *texts("flicker_rates", note=note, lags=lag_ms, said=rates), table)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hicp_lib.study.plots.palette import detector_colour, detector_marker
+from hicp_lib.study.plots.palette import SUBSET_COLOURS, SUBSET_MARKERS, detector_colour, detector_marker
 from hicp_lib.study.plots.style import in_lines, new_figure
 
 _BOUNDS = ("value", "low", "high")
@@ -161,6 +161,27 @@ def detector_dots(detectors: Iterable[str]) -> dict[str, dict[str, Any]]:
         name: {"color": detector_colour(name), "fmt": detector_marker(name), "label": name}
         for name in detectors
     }
+
+
+def subset_dots(subsets: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Colour, marker and label of each subset's `dots`."""
+    pens = {
+        name: {"color": SUBSET_COLOURS.get(name), "fmt": SUBSET_MARKERS.get(name, "o")} for name in subsets
+    }
+    return {name: pen | {"label": name} for name, pen in pens.items()}
+
+
+def own_bodies(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of a table on bodies, without combinations whose body detector has the same rows.
+
+    Examples
+    --------
+    >>> table = pd.DataFrame({"detector": ["posenet", "combined:posenet+mediapipe-hands"]})
+    >>> own_bodies(table)["detector"].tolist()
+    ['posenet']
+    """
+    bodies = table["detector"].astype(str).str.extract(r"^combined:([^+]+)\+", expand=False)
+    return table[~bodies.isin(table["detector"].unique())]
 
 
 def dots_in_rows(

@@ -13,8 +13,9 @@ DETECTOR_STYLES: dict[str, tuple[str, str]] = {
 } | {PERFECT: (TRUTH_COLOUR, "x")}
 OTHER_COLOUR, _OTHER_MARKER = "#595959", "."
 
-# The two subsets of HiCP, and the two boxes of the paper's figure of how they are made.
-SUBSET_COLOURS = {"basic": "#0072B2", "headless": "#D55E00"}
+# The two subsets of HiCP and the near one, and the two boxes of the paper's figure of how they are made.
+SUBSET_COLOURS = {"basic": "#0072B2", "headless": "#D55E00", "near": "#009E73"}
+SUBSET_MARKERS = {"basic": "o", "headless": "s", "near": "^"}
 HEAD_COLOUR = "#D5272D"
 BODY_COLOUR = "#1B9E4B"
 

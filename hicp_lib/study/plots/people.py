@@ -116,6 +116,12 @@ def picture_grid(
     return Figure(figure, caption, alt)
 
 
+def title_pictures(grid: Figure, titles: Sequence[str], fontsize: float) -> None:
+    """Write a title over each picture of a `picture_grid`, row by row; its empty cells have none."""
+    for axis, title in zip([axis for axis in grid.figure.axes if axis.images], titles, strict=True):
+        axis.set_title(title, loc="center", fontsize=fontsize, pad=2)
+
+
 @in_style
 def detections_grid(
     pictures: Mapping[str, tuple[np.ndarray, Mapping[str, Detections]]], min_score: float, note: str = ""

@@ -1,13 +1,12 @@
 """Keypoints outside the picture: what is known of them, and what a detector makes of them."""
 
 import numpy as np
-import pytest
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.evaluation.failures.error_kinds import all_errors
 from hicp_lib.evaluation.failures.false_confidence import MEASURES, paper_remarks, scores_by_state
-from hicp_lib.evaluation.failures.placed_keypoints import from_the_cut, landed, placed_keypoints
+from hicp_lib.evaluation.failures.placed_keypoints import landed, placed_keypoints
 from hicp_lib.evaluation.failures.presence import false_presence
 from hicp_lib.evaluation.failures.without_head import hallucinated_heads
 from hicp_lib.evaluation.statistics.resampling import Draws
@@ -46,7 +45,7 @@ def test_where_nobody_is_found_every_table_and_figure_is_empty_but_there(world):
     invented = false_presence(truth, found, placed, source, Draws(10))
     assert invented["n_found"].eq(0).all() and invented["value"].eq(0).all()
     assert draw.false_presence(invented, "drawn").table["part"].tolist() == ["head", "head"]
-    heads = draw.hallucinated_heads(hallucinated_heads(placed), "drawn")
+    heads = draw.invented_heads(hallucinated_heads(placed), "", truth["headless"], {}, "drawn")
     assert "Nothing to draw" in heads.figure.texts[0].get_text()
     assert draw.scores_by_state(scores_by_state(placed, Draws(10)), "drawn").table.empty
     remarks = paper_remarks(placed, all_errors(truth, found), truth, found, Draws(10))
@@ -59,14 +58,6 @@ def test_places_are_named_by_the_picture_border(world):
     points[0, :4] = [[320, 240], [5, 240], [-3, 240], [320, 479]]
     place = by_keypoint(placed_keypoints(truth, found, source).assign(place=lambda t: landed(t)), "place")
     assert place[:4].tolist() == ["inside", "at the border", "outside", "at the border"]
-
-
-@pytest.mark.parametrize("side, place", [("top", (0.3, -0.1)), ("bottom", (0.3, 1.1)), ("left", (-0.1, 0.3)),
-                                         ("right", (1.1, 0.3))])  # fmt: skip
-def test_pictures_are_turned_so_that_the_cut_is_above(world, side, place):
-    table = placed_keypoints(world[1], world[2], world[0]).iloc[:1]
-    turned = from_the_cut(table.assign(x=place[0], y=place[1], cut_side=side))
-    assert turned.to_numpy()[0] == pytest.approx([0.3, -0.1])
 
 
 def test_the_border_is_a_twentieth_of_the_picture_and_its_edge_belongs_to_it(world):
@@ -82,4 +73,4 @@ def test_places_are_shares_of_the_picture_from_its_outer_edge(world):
     found["headless", "mediapipe-pose"][5].keypoints_px[0, :2] = [[-0.5, -0.5], [639.5, 479.5]]
     table = placed_keypoints(truth, found, source).set_index("keypoint")
     assert table.loc[[0, 1], ["x", "y"]].to_numpy().tolist() == [[0, 0], [1, 1]]
-    assert table.loc[0, "cut_side"] == "top" and table.loc[0, "source_image"] == 7
+    assert table.loc[0, "source_image"] == 7

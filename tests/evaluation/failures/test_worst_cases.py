@@ -21,6 +21,7 @@ def test_worst_cases_are_the_surest_mistakes_and_the_overlooked():
         ["surest mistakes", 1, 0], ["surest mistakes", 2, 1], ["overlooked", 1, 2],
     ]  # fmt: skip
     assert table["badness"].tolist() == pytest.approx([1.0, 0.5, 17])
+    assert table["mistakes"].tolist() == ["miss × 2", "miss × 1", "17 visible keypoints"]
 
 
 def test_only_visible_keypoints_are_overlooked_and_an_image_counts_once():
