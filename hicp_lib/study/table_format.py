@@ -88,7 +88,7 @@ def with_bounds(value: float, low: float, high: float, digits: int = 2) -> str:
     >>> with_bounds(0.714, 0.65, 0.77), with_bounds(0.714, np.nan, np.nan), with_bounds(np.nan, 0, 0)
     ('0.71 [0.65, 0.77]', '0.71', '–')
     """
-    interval = f" [{low:.{digits}f}, {high:.{digits}f}]" if value == value and low == low else ""
+    interval = f" [{_number(low, digits)}, {_number(high, digits)}]" if value == value and low == low else ""
     return _number(value, digits) + interval
 
 
@@ -157,4 +157,4 @@ def not_available(needed: str) -> pd.DataFrame:
 
 
 def _number(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+    return f"{round(value, digits) + 0.0:.{digits}f}" if math.isfinite(value) else "–"  # never "-0.00"
