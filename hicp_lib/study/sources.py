@@ -150,8 +150,8 @@ def _rendered(n_scenes: int, seed: int, near: bool = False) -> tuple[Path, Path]
         from hicp_lib.experiments.near import near_stage, random_stage  # Open3D takes a second to load
         from hicp_lib.simulation.world.scenes import render_dataset
 
-        staged = near_stage if near else random_stage
-        render_dataset(folder, n=n_scenes, seed=seed, progress=sys.stderr.isatty(), staged=staged)
+        shown, staged = sys.stderr.isatty(), near_stage if near else random_stage
+        render_dataset(folder, n=n_scenes, seed=seed, progress=shown, staged=staged)
     return folder / "annotations.json", folder / "images"
 
 

@@ -96,8 +96,7 @@ def metric_table(drawn: Drawn) -> pd.DataFrame:
 def pairs(drawn: Drawn) -> pd.DataFrame:
     """AP and AR of every detector less every other's, on the same crops and the same draws of them.
 
-    Two detectors stumble over the same pictures, so this says more of which is better than two intervals
-    side by side.
+    Detectors fail on the same images, so this says more of which is better than two intervals side by side.
 
     Parameters
     ----------

@@ -21,8 +21,8 @@ def box_sources(table: pd.DataFrame, data_note: str) -> Figure:
     values = rows.pivot_table(index="subset", columns="detector", values="value", sort=False)
     whole, _, true_boxes, *_ = names
     gained = (values[true_boxes] - values[whole]).dropna().round(2) + 0.0  # never -0.00
-    said = extreme(rows, "idxmax")
-    return Figure(figure, *texts("box_sources", note=data_note, said=said, gained=gained), table)
+    told = texts("box_sources", note=data_note, said=extreme(rows, "idxmax"), gained=gained)
+    return Figure(figure, *told, table)
 
 
 @in_style
@@ -36,7 +36,7 @@ def loss_shares(table: pd.DataFrame, data_note: str) -> Figure:
     for axis, part, share in panels:
         dots_by_subset(axis, part, names)
         axis.set_title(share.capitalize(), fontsize=10)
-        axis.set(xlabel="loss of AP")
+        axis.set_xlabel("loss of AP")
     marks.legend_below(figure, axes)
-    said = rows[rows["subset"] == "headless"]
-    return Figure(figure, *texts("loss_shares", note=data_note, said=said), rows)
+    told = texts("loss_shares", note=data_note, said=rows[rows["subset"] == "headless"])
+    return Figure(figure, *told, rows)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -56,15 +57,13 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
         start = np.floor(5 * np.nan_to_num(least)) / 5
         ticks = np.arange(start, 1.01, 0.2)
         axis.set(aspect="equal", xlim=(start, 1.02), ylim=(start, 1.02), xticks=ticks, yticks=ticks)
-    pens = {name: {"marker": detector_marker(name), "lw": 2, "color": detector_colour(name)}
-            for name in table["detector"].unique()}  # fmt: skip
-    pens |= {f"OKS {threshold}": {"marker": "o", "ls": "", "fillstyle": fill}
-             for threshold, (*_, fill) in _THRESHOLDS.items()}  # fmt: skip
+    pens = {name: {**_pen(name), "lw": 2} for name in table["detector"].unique()}
+    for threshold, (*_, fill) in _THRESHOLDS.items():
+        pens[f"OKS {threshold}"] = {"marker": "o", "ls": "", "fillstyle": fill}
     marks.add_keys(axes[0, 0], (), pens)
     marks.legend_below(figure, axes[0, 0], ncols=_legend_columns(pens))
     said = extreme(table[table["metric"] == "AP"], "idxmax")
-    group = _short_title(table["group"].iloc[0])
-    return Figure(figure, *texts("precision_recall", note=data_note, group=group, said=said), table)
+    return Figure(figure, *texts("precision_recall", note=data_note, said=said), table)
 
 
 def _panels(table: pd.DataFrame, height_in: float, x_label: str, y_label: str):
@@ -80,6 +79,10 @@ def _panels(table: pd.DataFrame, height_in: float, x_label: str, y_label: str):
     for axis in axes[:, 0]:
         axis.set_ylabel(y_label)
     return figure, axes, panels
+
+
+def _pen(detector: str) -> dict[str, Any]:
+    return {"color": detector_colour(detector), "marker": detector_marker(detector), "ms": 6}
 
 
 def _short_title(group: str) -> str:
@@ -98,7 +101,7 @@ def extreme(rows: pd.DataFrame, which: str) -> pd.DataFrame:
 
 
 def _scatter_detector(axis, by_metric: pd.DataFrame, detector: str) -> None:
-    pen = {"color": detector_colour(detector), "marker": detector_marker(detector), "markersize": 7}
+    pen = _pen(detector)
     precisions, recalls, fills = zip(*_THRESHOLDS.values(), strict=True)
     x, y = (by_metric.loc[list(names), "value"] for names in (recalls, precisions))
     axis.plot(x, y, color=pen["color"], lw=2, alpha=0.4)
@@ -130,10 +133,8 @@ def found_and_placed(table: pd.DataFrame, data_note: str) -> Figure:
     labels = {FOUND: "share of people found", OKS_OF_FOUND: "mean OKS of the found"}
     rows = table[table["what"].isin(labels)]
     figure = _by_subset(rows, labels, "what")
-    group = _short_title(rows["group"].iloc[0])
-    least = {name: extreme(rows[rows["what"] == what], "idxmin")
-             for name, what in (("said", FOUND), ("placed", OKS_OF_FOUND))}  # fmt: skip
-    return Figure(figure, *texts("found_and_placed", note=data_note, group=group, **least), table)
+    fewest, roughest = (extreme(rows[rows["what"] == what], "idxmin") for what in labels)
+    return Figure(figure, *texts("found_and_placed", note=data_note, said=fewest, placed=roughest), table)
 
 
 def _by_subset(rows: pd.DataFrame, labels: dict[str, str], across: str):
@@ -180,16 +181,14 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
     for axis, rows, *_ in panels:
         for detector, people in rows.groupby("detector", sort=False):
             oks = np.sort(people["oks"][people["oks"] > 0])
-            share = np.arange(len(oks), 0, -1) / len(people)
-            steps = np.r_[0, oks, 1], np.r_[len(oks) / len(people), share, 0]
+            steps = np.r_[0, oks, 1], np.r_[len(oks), np.arange(len(oks), -1, -1)] / len(people)
             apart = 0.05 + 0.2 * names.index(detector) / len(names), 0.2  # of the panel's diagonal
-            pen = {"color": detector_colour(detector), "marker": detector_marker(detector)}
-            axis.step(*steps, where="pre", label=detector, markevery=apart, **pen)
+            axis.step(*steps, where="pre", label=detector, markevery=apart, **_pen(detector))
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
     marks.legend_below(figure, axes, ncols=_legend_columns(names))
     medians = table.groupby(["subset", "group", "detector"], sort=False)["oks"].median().rename("value")
-    said, group = extreme(medians.reset_index(), "idxmin"), _short_title(table["group"].iloc[0])
-    return Figure(figure, *texts("oks_curves", note=data_note, group=group, said=said), table)
+    said = extreme(medians.reset_index(), "idxmin")
+    return Figure(figure, *texts("oks_curves", note=data_note, said=said), table)
 
 
 def example(
@@ -223,14 +222,12 @@ def example(
     bodies = oks[(oks["group"] == "body") & (oks["image_id"] == image_id)].set_index("detector")["oks"]
     for name, run in found.items():
         seen = run.get(image_id, Detections.none())
-        words = f"OKS {bodies[name]:.2f}" if name in bodies else "found"
-        words = words if len(seen) else "nothing found"
+        words = "nothing found" if not len(seen) else f"OKS {bodies[name]:.2f}" if name in bodies else "found"
         cells[f"{name}\n{words}"] = draw_detections(image, seen, name, _MIN_SCORE)
-    pictures, titles = list(cells.values()), list(cells)
-    rows = [pictures[start : start + 3] for start in range(0, len(pictures), 3)]
-    said = [title.replace("\n", ": ") for title in titles[1:]]
+    rows = [list(cells.values())[start : start + 3] for start in range(0, len(cells), 3)]
+    said = [title.replace("\n", ": ") for title in cells][1:]
     told = texts("example", note=note, said=said, min_score=_MIN_SCORE)
-    grid = picture_grid(rows, *told, titles=titles, cell_in=WIDTH_IN / 3)
+    grid = picture_grid(rows, *told, titles=list(cells), cell_in=WIDTH_IN / 3)
     for axis in grid.figure.axes:
         axis.title.set_fontsize(9)
     return grid

@@ -56,7 +56,7 @@ def test_comparison_figures_say_on_what_data_and_what_they_show(metrics, draw):
 
 def test_alt_text_names_the_best_detector(metrics):
     metrics.loc[(metrics["detector"] == "openpose-mobilenet") & (metrics["metric"] == "AP"), "value"] = 0.99
-    assert "body: openpose-mobilenet with 0.99 on basic" in evaluation.precision_recall(metrics, "x").alt
+    assert "openpose-mobilenet with 0.99 (basic body)" in evaluation.precision_recall(metrics, "x").alt
 
 
 def test_the_axes_of_a_group_begin_below_its_lowest_interval(metrics):
@@ -108,7 +108,7 @@ def test_found_and_placed_are_side_by_side_for_who_is_found(oks):
     share = len(of_found) / len(oks)
     assert found == pytest.approx([1.0, share])
     assert placed == pytest.approx([0.9, sum(of_found) / len(of_found)] if of_found else [0.9])
-    assert f"posenet {share:.0%} on headless" in figure.alt
+    assert f"posenet {share:.0%} (headless body)" in figure.alt
 
 
 def test_the_share_of_people_falls_with_oks():
