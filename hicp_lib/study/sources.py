@@ -132,7 +132,7 @@ def open_near(data: Source, n_scenes: int, seed: int, min_pixels: int) -> Source
     """
     if data.kind != "rendered":
         return None
-    return _source("near", f"{n_scenes} people from near", *_rendered(n_scenes, seed, near=True), min_pixels)
+    return _source("near", "rendered people from near", *_rendered(n_scenes, seed, near=True), min_pixels)
 
 
 def _source(kind: str, note: str, annotations: Path, images: Path, min_pixels: int) -> Source:

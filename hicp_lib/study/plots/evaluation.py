@@ -30,7 +30,7 @@ _THRESHOLDS = {
 _SUBSETS: dict[str, tuple[str, str | None]] = {
     "whole images": ("^", None), "basic": ("o", None), "headless": ("o", "white"), "near": ("D", None),
 }  # fmt: skip
-_MIN_SCORE = 0.3  # of keypoints that are drawn
+_MIN_SCORE = 0.1  # of keypoints that are drawn
 _PENS = {
     RENDERED: {"color": "#0072B2", "fmt": "o", "label": RENDERED},
     PHOTOGRAPHED: {"color": "#D55E00", "fmt": "s", "label": PHOTOGRAPHED},
