@@ -22,7 +22,7 @@ class Source:
     Attributes
     ----------
     kind : str
-        "rendered" or "halpe".
+        "rendered", "halpe" or "near".
     note : str
         Description of the people, for captions.
     annotations, images : Path
@@ -110,20 +110,48 @@ def open_source(
         note = f"COCO images with Halpe annotations ({annotations.name})"
     else:
         raise InputError(f"source={source!r} is unknown; use one of {', '.join(SOURCES)}")
+    return _source(source, note, annotations, images, min_pixels)
+
+
+def open_near(data: Source, n_scenes: int, seed: int, min_pixels: int) -> Source | None:
+    """Rendered people as a robot's camera sees them from near; their crops are cut as Basic's.
+
+    Parameters
+    ----------
+    data : Source
+        From `open_source`.
+    n_scenes : int
+        From how many of its scenes, from the first.
+    seed, min_pixels : int
+        As of `open_source`.
+
+    Returns
+    -------
+    Source or None
+        None for photographs: they cannot be taken from elsewhere.
+    """
+    if data.kind != "rendered":
+        return None
+    return _source("near", "rendered people from near", *_rendered(n_scenes, seed, near=True), min_pixels)
+
+
+def _source(kind: str, note: str, annotations: Path, images: Path, min_pixels: int) -> Source:
     folder = _crops(annotations, images, min_pixels)
     summary = read_json(folder / "summary.json")
     if not summary["basic"]["kept"]:
         raise InputError(f"{annotations}: nobody becomes a crop {summary['basic']}; is min_pixels too large?")
-    return Source(source, note, annotations, images, folder / "basic", folder / "headless", summary)
+    return Source(kind, note, annotations, images, folder / "basic", folder / "headless", summary)
 
 
-def _rendered(n_scenes: int, seed: int) -> tuple[Path, Path]:
-    made_by = "hicp_lib.simulation.world.scenes"
-    folder = cache_dir() / "scenes" / key([made_by], n=n_scenes, seed=seed)[:16]
+def _rendered(n_scenes: int, seed: int, near: bool = False) -> tuple[Path, Path]:
+    made_by = ["hicp_lib.simulation.world.scenes", *(["hicp_lib.experiments.near"] if near else [])]
+    folder = cache_dir() / "scenes" / key(made_by, n=n_scenes, seed=seed)[:16]
     if not (folder / "annotations.json").is_file():
-        from hicp_lib.simulation.world.scenes import render_dataset  # Open3D takes a second to load
+        from hicp_lib.experiments.near import near_stage, random_stage  # Open3D takes a second to load
+        from hicp_lib.simulation.world.scenes import render_dataset
 
-        render_dataset(folder, n=n_scenes, seed=seed, progress=sys.stderr.isatty())
+        shown, staged = sys.stderr.isatty(), near_stage if near else random_stage
+        render_dataset(folder, n=n_scenes, seed=seed, progress=shown, staged=staged)
     return folder / "annotations.json", folder / "images"
 
 

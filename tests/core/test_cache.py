@@ -27,6 +27,7 @@ from hicp_lib.report.runs import run_key
 # What makes each kind of cached result, and the modules where its code ends.
 KINDS = {
     "scenes": (["hicp_lib.simulation.world.scenes"], ()),
+    "near": (["hicp_lib.simulation.world.scenes", "hicp_lib.experiments.near"], ()),
     "crops": (["hicp_lib.datasets.subsets"], ()),
     "close": (["hicp_lib.datasets.close"], ()),
     "doses": (["hicp_lib.experiments.doses"], ()),

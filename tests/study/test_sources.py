@@ -1,14 +1,16 @@
 """Where people come from: made once, made anew when something changed, refused in one line."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.datasets import subsets
-from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
+from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
 from hicp_lib.study import sources
-from hicp_lib.study.sources import open_source
+from hicp_lib.study.sources import open_near, open_source
 
 
 @pytest.fixture
@@ -63,3 +65,17 @@ def test_a_changed_image_limit_or_rule_makes_new_crops(halpe, monkeypatch, tmp_p
 def test_what_is_missing_is_said(arguments, message):
     with pytest.raises(InputError, match=message):
         open_source(*arguments)
+
+
+def test_only_rendered_people_are_seen_from_near(halpe):
+    data = open_source("halpe", *halpe)
+    assert open_near(data, 1, 0, 20_000) is None
+    near = open_near(replace(data, kind="rendered"), 1, 0, 20_000)
+    (seen,), crops = (
+        read_annotations(near.annotations).extras,
+        read_annotations(near.basic / "annotations.json"),
+    )
+    assert seen["distance_m"] < 2 and seen["identity"]["split"] == "held out"
+    assert near.kind == "near" and "from near" in near.note and len(crops) == 1
+    with pytest.raises(InputError, match="is min_pixels too large"):
+        open_near(replace(data, kind="rendered"), 1, 0, 10**6)

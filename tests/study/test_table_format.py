@@ -10,6 +10,7 @@ from hicp_lib.study.table_format import bounds_of, in_cm, in_units, not_availabl
 def test_a_value_stands_with_its_interval_and_nothing_is_a_dash():
     assert with_bounds(0.714, 0.65, 0.7749) == "0.71 [0.65, 0.77]"
     assert with_bounds(12.34, 11.0, 13.06, digits=1) == "12.3 [11.0, 13.1]"
+    assert with_bounds(-0.004, -0.006, 0.0) == "0.00 [-0.01, 0.00]"
     assert with_bounds(np.nan, np.nan, np.nan) == "–" and with_bounds(0.714, np.nan, np.nan) == "0.71"
 
 

@@ -6,6 +6,7 @@ five times as large without more information. Image k depends on the seed and k 
 processes does not matter, and a larger data set contains the smaller one.
 """
 
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -20,7 +21,7 @@ from hicp_lib.core.folders import locked_folder
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.recordings.writer import write_rgb
-from hicp_lib.simulation.body.identities import HELD_OUT, split_members, stream
+from hicp_lib.simulation.body.identities import HELD_OUT, Rng, split_members, stream
 from hicp_lib.simulation.rendering.camera import project_world
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import Frame, render
@@ -30,6 +31,7 @@ from hicp_lib.simulation.world.visibility import keypoint_visibility
 
 MAX_SCENES = 1_000_000
 _MAX_NUMBER = 1_000_000_000  # of seeds
+Staged = Callable[[Rng, str], Stage]
 _PARTS_DIR = ".scenes"  # the people of finished images, and what they were made with
 
 
@@ -40,6 +42,7 @@ def render_dataset(
     workers: Workers = None,
     progress: bool = True,
     split: str = HELD_OUT,
+    staged: Staged = random_stage,
 ) -> Annotations:
     """Render `n` images with 1 to 3 people each into a dataset folder.
 
@@ -62,6 +65,8 @@ def render_dataset(
         Whether to show a bar on a terminal.
     split : str, optional
         Whose people: "development" or "held out".
+    staged : callable, optional
+        The scene to photograph, from a generator and the split; a function of a module.
 
     Returns
     -------
@@ -76,10 +81,10 @@ def render_dataset(
     check_numbers(n=(n, 1, MAX_SCENES), seed=(seed, 0, _MAX_NUMBER))
     split_members(split)  # an unknown name fails before anything is written
     with locked_folder(out):
-        stamp = {"renderer": key([render_dataset]), "seed": int(seed), "people": split}
+        stamp = {"renderer": key([render_dataset, staged]), "seed": int(seed), "people": split}
         keep_parts(out, _PARTS_DIR, "annotations.json", stamp, int(n), partial(_files, out), [])
         missing = [k for k in range(n) if read_part(*_files(out, k)) is None]
-        one = partial(_render_one, seed=seed, split=split)
+        one = partial(_render_one, seed=seed, split=split, staged=staged)
         jobs = [(str(_files(Path(), k)[0]), partial(one, index=k)) for k in missing]
         done, shown = run_jobs(jobs, workers, folder=out), {"unit": "image", "disable": not progress or None}
         for _ in tqdm(done, "rendering", n, initial=n - len(missing), **shown):
@@ -94,14 +99,16 @@ def _files(out: Path, index: int) -> list[Path]:
     return [out / _PARTS_DIR / f"{index:06d}.json", out / "images" / f"{index:06d}.jpg"]
 
 
-def _render_one(out: Path, seed: int, index: int, split: str) -> None:
-    image, people = render_scene(seed, index, split)
+def _render_one(out: Path, seed: int, index: int, split: str, staged: Staged) -> None:
+    image, people = render_scene(seed, index, split, staged)
     write_rgb(_files(out, index)[1], image)
     height, width = image.shape[:2]
     write_part({"width": width, "height": height, "people": people}, *_files(out, index))
 
 
-def render_scene(seed: int, index: int, split: str = HELD_OUT) -> tuple[np.ndarray, list[dict]]:
+def render_scene(
+    seed: int, index: int, split: str = HELD_OUT, staged: Staged = random_stage
+) -> tuple[np.ndarray, list[dict]]:
     """One image of a data set.
 
     Parameters
@@ -109,6 +116,8 @@ def render_scene(seed: int, index: int, split: str = HELD_OUT) -> tuple[np.ndarr
     seed, index : int
     split : str, optional
         Whose people: "development" or "held out".
+    staged : callable, optional
+        As of `render_dataset`.
 
     Returns
     -------
@@ -119,7 +128,7 @@ def render_scene(seed: int, index: int, split: str = HELD_OUT) -> tuple[np.ndarr
     """
     rng = stream(split, seed, index)
     while True:
-        stage = random_stage(rng, split)
+        stage = staged(rng, split)
         frame = render(stage.world, stage.camera, rng)
         people = annotate(stage, frame)
         if people:  # somebody is in the picture

@@ -1,6 +1,8 @@
 """Figures of the 2D comparison: precision against recall, the loss without a head, who is found, time."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -8,16 +10,27 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
 from hicp_lib.evaluation.ap.found_and_placed import FOUND, OKS_OF_FOUND
+from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.photographs import PHOTOGRAPHED, RENDERED
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import THRESHOLD_MARKERS, detector_colour
-from hicp_lib.study.plots.people import detections_grid
+from hicp_lib.study.plots.palette import detector_colour, detector_marker
+from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
 from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
 
+Run = Mapping[int, Detections]
 GROUP_TITLES = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
 WIDTH_IN = 5.5  # what can be read on a telephone, and fills a page
-_THRESHOLDS = {".5": ("AP50", "AR50"), ".75": ("AP75", "AR75"), ".5:.95": ("AP", "AR")}
-_SUBSETS = {"basic": 0, "headless": 1}  # in a row: above filled, below open
+# By OKS threshold: precision, recall, and how much of a marker is filled.
+_THRESHOLDS = {
+    ".5": ("AP50", "AR50", "none"),
+    ".75": ("AP75", "AR75", "left"),
+    ".5:.95": ("AP", "AR", "full"),
+}
+# Marks in the row of a detector, from above: marker, and its face if not filled.
+_SUBSETS: dict[str, tuple[str, str | None]] = {
+    "whole images": ("^", None), "basic": ("o", None), "headless": ("o", "white"), "near": ("D", None),
+}  # fmt: skip
+_MIN_SCORE = 0.1  # of keypoints that are drawn
 _PENS = {
     RENDERED: {"color": "#0072B2", "fmt": "o", "label": RENDERED},
     PHOTOGRAPHED: {"color": "#D55E00", "fmt": "s", "label": PHOTOGRAPHED},
@@ -36,36 +49,40 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
     data_note : str
         On what data, e.g. "rendered people"; becomes part of the caption.
     """
-    figure, axes, panels = _panels(table, 2.7, "average recall", "average precision")
-    for axis, rows, _, _ in panels:
+    figure, axes, panels = _panels(table, 2.3, "average recall", "average precision")
+    for axis, rows, *_ in panels:
         for detector, of_detector in rows.groupby("detector", sort=False):
-            _scatter_detector(axis, of_detector, detector)
-        axis.set(aspect="equal")
-    for row, group in zip(axes, table["group"].unique(), strict=True):
-        least = table.loc[table["group"] == group, ["value", "low"]].min().min()
+            _scatter_detector(axis, of_detector.set_index("metric"), detector)
+        least = table.loc[table["group"].isin(rows["group"]), ["value", "low"]].min().min()
         start = np.floor(5 * np.nan_to_num(least)) / 5
         ticks = np.arange(start, 1.01, 0.2)
-        row[0].set(xlim=(start, 1.02), ylim=(start, 1.02), xticks=ticks, yticks=ticks)
-    detectors = table["detector"].unique()
-    shapes = {f"OKS {name}": {"marker": marker, "ls": ""} for name, marker in THRESHOLD_MARKERS.items()}
-    marks.add_keys(axes[0, 0], detectors, shapes)
-    marks.legend_below(figure, axes[0, 0], ncols=_legend_columns(detectors))
-    rows = table[(table["metric"] == "AP") & table["value"].notna()]
-    best = rows.loc[rows.groupby(["subset", "group"], sort=False)["value"].idxmax()]
-    return Figure(figure, *texts("precision_recall", note=data_note, said=best), table)
+        axis.set(aspect="equal", xlim=(start, 1.02), ylim=(start, 1.02), xticks=ticks, yticks=ticks)
+    pens = {name: {**_pen(name), "lw": 2} for name in table["detector"].unique()}
+    for threshold, (*_, fill) in _THRESHOLDS.items():
+        pens[f"OKS {threshold}"] = {"marker": "o", "ls": "", "fillstyle": fill}
+    marks.add_keys(axes[0, 0], (), pens)
+    marks.legend_below(figure, axes[0, 0], ncols=_legend_columns(pens))
+    said = extreme(table[table["metric"] == "AP"], "idxmax")
+    return Figure(figure, *texts("precision_recall", note=data_note, said=said), table)
 
 
 def _panels(table: pd.DataFrame, height_in: float, x_label: str, y_label: str):
-    """`marks.panels` for each group of keypoints (down) and subset (across)."""
-    size = WIDTH_IN, height_in * table["group"].nunique() + 0.6
-    figure, axes, panels = marks.panels(table, ["group", "subset"], *size, sharex="row", sharey="row")
-    for axis, _, group, subset in panels:
-        axis.set_title(f"{subset.capitalize()}, {_short_title(group)}")
+    """`marks.panels` for each subset (down) and group of keypoints (across); of one group all abreast."""
+    by = ["subset", "group"] if table["group"].nunique() > 1 else ["group", "subset"]
+    size = WIDTH_IN, height_in * table[by[0]].nunique() + 1.1
+    figure, axes, panels = marks.panels(table, by, *size)
+    for axis, _, *case in panels:
+        of = dict(zip(by, case, strict=True))
+        axis.set_title(f"{of['subset'].capitalize()}, {_short_title(of['group'])}", fontsize=10)
     for axis in axes[-1]:
         axis.set_xlabel(x_label)
     for axis in axes[:, 0]:
         axis.set_ylabel(y_label)
     return figure, axes, panels
+
+
+def _pen(detector: str) -> dict[str, Any]:
+    return {"color": detector_colour(detector), "marker": detector_marker(detector), "ms": 6}
 
 
 def _short_title(group: str) -> str:
@@ -77,16 +94,21 @@ def _legend_columns(names) -> int:
     return 2 if max(map(len, names)) < 30 else 1
 
 
-def _scatter_detector(axis, rows: pd.DataFrame, detector: str) -> None:
-    by_metric = {metric: row for metric, row in rows.groupby("metric")}
-    colour = detector_colour(detector)
-    track = [[by_metric[pair[k]]["value"].iloc[0] for pair in _THRESHOLDS.values()] for k in (1, 0)]
-    axis.plot(*track, color=colour, lw=2, alpha=0.4)
-    for threshold, (precision, recall) in _THRESHOLDS.items():
-        y, x = by_metric[precision], by_metric[recall]
-        reach = {"xerr": marks.whiskers(x), "yerr": marks.whiskers(y)}
-        pen = {"color": colour, "markersize": 6, "mec": "white", "mew": 0.5, "elinewidth": 0.7}
-        axis.errorbar(x["value"], y["value"], fmt=THRESHOLD_MARKERS[threshold], **reach, **pen)
+def extreme(rows: pd.DataFrame, which: str) -> pd.DataFrame:
+    """Of each subset the row with the highest (idxmax) or lowest value, of the first group of keypoints."""
+    first = rows[(rows["group"] == rows["group"].iloc[0]) & rows["value"].notna()]
+    return first.loc[getattr(first.groupby("subset", sort=False)["value"], which)()]
+
+
+def _scatter_detector(axis, by_metric: pd.DataFrame, detector: str) -> None:
+    pen = _pen(detector)
+    precisions, recalls, fills = zip(*_THRESHOLDS.values(), strict=True)
+    x, y = (by_metric.loc[list(names), "value"] for names in (recalls, precisions))
+    axis.plot(x, y, color=pen["color"], lw=2, alpha=0.4)
+    reach = {"xerr": marks.whiskers(by_metric.loc[["AR"]]), "yerr": marks.whiskers(by_metric.loc[["AP"]])}
+    axis.errorbar(x["AR"], y["AP"], **reach, color=pen["color"], elinewidth=0.8)
+    for fill, *place in zip(fills, x, y, strict=True):
+        axis.plot(*place, **pen, fillstyle=fill, markerfacecoloralt="white")
 
 
 @in_style
@@ -96,7 +118,7 @@ def loss_without_head(table: pd.DataFrame, data_note: str) -> Figure:
     `table` as for `precision_recall`; only rows with metric "AP" are drawn.
     """
     rows = table[table["metric"] == "AP"]
-    figure = _with_and_without(rows, {"AP": "average precision (.5:.95)"}, "metric")
+    figure = _by_subset(rows, {"AP": "average precision (.5:.95)"}, "metric")
     drops = rows.pivot_table(index=["detector", "group"], columns="subset", values="value", sort=False)
     change = drops.get("headless", np.nan) - drops.get("basic", np.nan)
     return Figure(figure, *texts("loss_without_head", note=data_note, said=change.dropna()), rows)
@@ -110,39 +132,42 @@ def found_and_placed(table: pd.DataFrame, data_note: str) -> Figure:
     """
     labels = {FOUND: "share of people found", OKS_OF_FOUND: "mean OKS of the found"}
     rows = table[table["what"].isin(labels)]
-    figure = _with_and_without(rows, labels, "what")
-    shares = rows[(rows["what"] == FOUND) & (rows["group"] == rows["group"].iloc[0])]
-    group = _short_title(rows["group"].iloc[0])
-    return Figure(figure, *texts("found_and_placed", note=data_note, group=group, said=shares), table)
+    figure = _by_subset(rows, labels, "what")
+    fewest, roughest = (extreme(rows[rows["what"] == what], "idxmin") for what in labels)
+    return Figure(figure, *texts("found_and_placed", note=data_note, said=fewest, placed=roughest), table)
 
 
-def _with_and_without(rows: pd.DataFrame, labels: dict[str, str], across: str):
-    """Dots with whiskers of each detector in Basic (filled) and Headless (open), joined.
-
-    A row of panels per group of keypoints, in each one per value of the column `across`, named by `labels`.
-    """
+def _by_subset(rows: pd.DataFrame, labels: dict[str, str], across: str):
+    """Dots of each detector by subset; panels by group of keypoints, and by the column `across`, named."""
     groups = rows["group"].unique()
     names = {group: list(rows.loc[rows["group"] == group, "detector"].unique()) for group in groups}
     heights = [len(of_group) + 0.8 for of_group in names.values()]
     height_in, shared = 0.5 * sum(heights) + 0.9, {"height_ratios": heights, "sharex": "col", "sharey": "row"}
     figure, axes, panels = marks.panels(rows, ["group", across], WIDTH_IN, height_in, **shared)
     for axis, part, group, what in panels:
-        for detector, pair in part.dropna(subset="value").groupby("detector", sort=False):
-            y = names[group].index(detector) + 0.24 * (pair["subset"].map(_SUBSETS).fillna(0.5) - 0.5)
-            colour = detector_colour(detector)
-            axis.plot(pair["value"], y, "-", lw=3, alpha=0.45, color=colour)
-            for subset, one in pair.groupby("subset"):
-                fill = "white" if subset == "headless" else colour
-                marks.dots(axis, one, y[one.index], color=colour, mfc=fill, ms=7, capsize=0)
-        marks.name_rows(axis, names[group])
+        dots_by_subset(axis, part, names[group])
         axis.set(xlim=(-0.03, 1.03), xlabel=labels[what])
         axis.label_outer()
     for axis, group in zip(axes[:, 0], groups, strict=True):
         axis.set_title(GROUP_TITLES.get(group, group))
-    fills = {"Basic": {}, "Headless": {"mfc": "white"}}
-    marks.add_keys(axes[0, 0], (), {name: {"marker": "o", "ls": ""} | fill for name, fill in fills.items()})
-    marks.legend_below(figure, axes[0, 0], ncols=2)
+    marks.legend_below(figure, axes, ncols=4)
     return figure
+
+
+def dots_by_subset(axis, rows: pd.DataFrame, names: list[str]) -> None:
+    """Dots with whiskers in rows named after detectors, a mark per subset; Basic and Headless are joined."""
+    subsets = [name for name in _SUBSETS if name in set(rows["subset"])]
+    places = rows["subset"].map(subsets.index).map(lambda k: marks.offset(k, len(subsets), 0.22))
+    for detector, of in rows.assign(y=places).dropna(subset="value").groupby("detector", sort=False):
+        of, colour = of.assign(y=of["y"] + names.index(detector)), detector_colour(detector.partition(",")[0])
+        pair = of[of["subset"].isin(["basic", "headless"])]
+        axis.plot(pair["value"], pair["y"], "-", lw=3, alpha=0.45, color=colour)
+        for subset, one in of.groupby("subset"):
+            marker, face = _SUBSETS[subset]
+            marks.dots(axis, one, one["y"], fmt=marker, color=colour, mfc=face, ms=6, capsize=0)
+    marks.name_rows(axis, [name.replace(", ", ",\n") for name in names])
+    keys = {name: {"marker": marker, "mfc": face, "ls": ""} for name, (marker, face) in _SUBSETS.items()}
+    marks.add_keys(axis, (), {name.capitalize(): keys[name] for name in subsets})
 
 
 @in_style
@@ -151,48 +176,61 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
 
     `table` has one row per person: columns `subset, group, detector, oks` (0 when nobody was found).
     """
-    figure, axes, panels = _panels(table, 2.2, "OKS of the best detection", "share at least as good")
-    medians = []
-    for axis, rows, group, subset in panels:
+    figure, axes, panels = _panels(table, 1.9, "OKS of the best detection", "share at least as good")
+    names = list(table["detector"].unique())
+    for axis, rows, *_ in panels:
         for detector, people in rows.groupby("detector", sort=False):
-            oks = np.sort(people["oks"].to_numpy())
-            share = 1 - np.arange(len(oks)) / len(oks)
-            steps = np.r_[0, oks, 1], np.r_[1, share, 0]
-            axis.step(*steps, color=detector_colour(detector), where="pre", label=detector)
-            medians.append(f"{detector} {np.median(oks):.2f} ({subset} {group})")
+            oks = np.sort(people["oks"][people["oks"] > 0])
+            steps = np.r_[0, oks, 1], np.r_[len(oks), np.arange(len(oks), -1, -1)] / len(people)
+            apart = 0.05 + 0.2 * names.index(detector) / len(names), 0.2  # of the panel's diagonal
+            axis.step(*steps, where="pre", label=detector, markevery=apart, **_pen(detector))
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
-    marks.legend_below(figure, axes, ncols=_legend_columns(table["detector"].unique()))
-    return Figure(figure, *texts("oks_curves", note=data_note, medians=medians), table)
+    marks.legend_below(figure, axes, ncols=_legend_columns(names))
+    medians = table.groupby(["subset", "group", "detector"], sort=False)["oks"].median().rename("value")
+    said = extreme(medians.reset_index(), "idxmin")
+    return Figure(figure, *texts("oks_curves", note=data_note, said=said), table)
 
 
-def examples(folders, truth, found, n_people: int, note: str) -> Figure:
-    """The first people who are in every subset, as each detector sees them.
+def example(
+    images_dir: Path,
+    people: Annotations,
+    image_id: int,
+    found: Mapping[str, Run],
+    oks: pd.DataFrame,
+    note: str,
+) -> Figure:
+    """One person, annotated and as each detector sees them, with the OKS of the best detection.
 
     Parameters
     ----------
-    folders : mapping of str to Path
-        Subset -> dataset folder.
-    truth : mapping of str to hicp_lib.formats.annotations.Annotations
-        By subset.
-    found : mapping of (str, str) to mapping of int to Detections
-        By subset and detector, then by image id.
-    n_people : int
-        How many are shown.
+    images_dir : Path
+        Folder of the images.
+    people : Annotations
+        The truth.
+    image_id : int
+        Which image.
+    found : mapping of str to mapping of int to Detections
+        By detector, then by image id.
+    oks : pd.DataFrame
+        As from `metric_table.people_oks`, of these people.
     note : str
         What the data are, for the caption.
     """
-    shared = [i for i in list(truth.values())[-1].images if all(i in p.images for p in truth.values())]
-    detectors = list(dict.fromkeys(detector for _, detector in found))
-    pictures = {
-        f"{subset} {i}": (
-            read_image(Path(folder) / "images" / truth[subset].images[i].file_name),
-            {name: found[subset, name].get(i, Detections.none()) for name in detectors},
-        )
-        for i in (shared or list(truth["basic"].images))[:n_people]
-        for subset, folder in folders.items()
-        if i in truth[subset].images
-    }
-    return detections_grid(pictures, min_score=0.3, note=f"Data: {note}.")
+    image = read_image(images_dir / people.images[image_id].file_name)
+    own = (people.image_ids == image_id) & ~people.is_crowd
+    cells = {"annotated": draw_truth(people, images_dir, image_id, own, "#FFFFFF")}
+    bodies = oks[(oks["group"] == "body") & (oks["image_id"] == image_id)].set_index("detector")["oks"]
+    for name, run in found.items():
+        seen = run.get(image_id, Detections.none())
+        words = "nothing found" if not len(seen) else f"OKS {bodies[name]:.2f}" if name in bodies else "found"
+        cells[f"{name}\n{words}"] = draw_detections(image, seen, name, _MIN_SCORE)
+    rows = [list(cells.values())[start : start + 3] for start in range(0, len(cells), 3)]
+    said = [title.replace("\n", ": ") for title in cells][1:]
+    told = texts("example", note=note, said=said, min_score=_MIN_SCORE)
+    grid = picture_grid(rows, *told, titles=list(cells), cell_in=WIDTH_IN / 3)
+    for axis in grid.figure.axes:
+        axis.title.set_fontsize(9)
+    return grid
 
 
 @in_style

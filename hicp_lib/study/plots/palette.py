@@ -19,9 +19,6 @@ SUBSET_MARKERS = {"basic": "o", "headless": "s", "near": "^"}
 HEAD_COLOUR = "#D5272D"
 BODY_COLOUR = "#1B9E4B"
 
-# The paper's marker shapes for the OKS thresholds.
-THRESHOLD_MARKERS = {".5": "s", ".75": "o", ".5:.95": "^"}
-
 
 def detector_colour(name: str) -> str:
     """The colour of a detector, also of variants such as "mmpose-imported"; others take the neutral grey.

@@ -68,7 +68,7 @@ def test_an_interrupted_run_is_taken_up_where_it_stopped(dataset, tmp_path, monk
     out = tmp_path / "out"
     rendered = []
 
-    def counted(seed, index, split):
+    def counted(seed, index, split, staged):
         rendered.append(index)
         if len(rendered) == 2:
             raise KeyboardInterrupt
@@ -89,7 +89,7 @@ def test_another_seed_reuses_nothing(tmp_path, monkeypatch):
     fake |= {"distance_m": 1.0, "identity": {}}
     calls = []
 
-    def quick(seed, index, split):
+    def quick(seed, index, split, staged):
         calls.append((seed, index, split))
         return np.zeros((4, 4, 3), np.uint8), [fake]
 
@@ -113,7 +113,7 @@ def quick(monkeypatch) -> list[int]:
     rendered = []
     fake = {"bbox": [0, 0, 2, 2], "area": 4, "keypoints": np.zeros((136, 3)).tolist()}
 
-    def scene(seed, index, split):
+    def scene(seed, index, split, staged):
         rendered.append(index)
         return np.full((4, 4, 3), seed, np.uint8), [fake | {"distance_m": 1.0, "identity": {}}]
 

@@ -1,4 +1,4 @@
-"""Figures of boxes and shares: every case has its bar, with few people and none, too."""
+"""Figures of boxes and shares: every case has its mark, with few people and none, too."""
 
 import numpy as np
 import pandas as pd
@@ -11,7 +11,7 @@ from hicp_lib.study.plots import box_sources
 from tests.evaluation.made_people import make_annotations, make_detections
 
 PAIR = ("movenet-lightning", "movenet-multipose")
-PLACES = ("whole images", "basic", "headless")
+PLACES = ("whole images", "basic", "headless", "near")
 
 
 @pytest.fixture(params=[(0, 4), (2, 4), (9, 12)], ids=lambda request: f"{request[0]} of {request[1]} found")
@@ -24,18 +24,25 @@ def drawn(request):
     return draw_cases(dict.fromkeys(PLACES, people), found, Draws(20), groups=["body"])
 
 
-def lengths(axis) -> list[float]:
-    return [bar.get_width() for bar in axis.patches]
+def dots(axis) -> list:
+    marked = [line for line in axis.get_lines() if line.get_marker() in ("^", "o", "D")]
+    return [line for line in marked if len(line.get_xdata()) == 1]
 
 
-def test_a_bar_for_each_source_of_the_box(drawn):
+def values(axis) -> list[float]:
+    return sorted(float(line.get_xdata()[0]) for line in dots(axis))
+
+
+def test_a_mark_for_each_source_of_the_box_and_place(drawn):
     table = metric_table(drawn)
     figure = box_sources.box_sources(table, "made-up people")
-    assert len(figure.figure.axes) == len(PLACES) and "made-up people" in figure.caption
-    for axis, place in zip(figure.figure.axes, PLACES, strict=True):
-        rows = table[(table["subset"] == place) & (table["metric"] == "AP")]
-        assert lengths(axis) == pytest.approx(rows["value"].tolist())
-    assert "movenet-lightning, true boxes" in figure.alt and len(figure.alt) < 800
+    (axis,) = figure.figure.axes
+    assert "made-up people" in figure.caption and figure.table is table
+    rows = table[table["metric"] == "AP"]
+    assert values(axis) == pytest.approx(sorted(rows["value"]))
+    assert len({(line.get_marker(), line.get_markerfacecolor()) for line in dots(axis)}) >= len(PLACES)
+    assert len({line.get_ydata()[0] for line in dots(axis)}) == len(rows)  # none hides another
+    assert "+0.00 on near" in figure.alt and len(figure.alt) < 600  # the same is found in every box
 
 
 def test_a_panel_for_each_share_and_none_for_the_difference_of_two_detectors(drawn):
@@ -44,5 +51,5 @@ def test_a_panel_for_each_share_and_none_for_the_difference_of_two_detectors(dra
     assert [axis.get_title(loc="left") for axis in figure.figure.axes] == [s.capitalize() for s in SHARES]
     shown = table[~table["detector"].str.contains(" less ")]
     for axis, share in zip(figure.figure.axes, SHARES, strict=True):
-        assert lengths(axis) == pytest.approx(shown.loc[shown["share"] == share, "value"].tolist())
+        assert values(axis) == pytest.approx(sorted(shown.loc[shown["share"] == share, "value"]))
     assert isinstance(figure.table, pd.DataFrame) and " less " not in figure.alt

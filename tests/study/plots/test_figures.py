@@ -56,7 +56,7 @@ def test_comparison_figures_say_on_what_data_and_what_they_show(metrics, draw):
 
 def test_alt_text_names_the_best_detector(metrics):
     metrics.loc[(metrics["detector"] == "openpose-mobilenet") & (metrics["metric"] == "AP"), "value"] = 0.99
-    assert "openpose-mobilenet with 0.99 on basic body" in evaluation.precision_recall(metrics, "x").alt
+    assert "openpose-mobilenet with 0.99 (basic body)" in evaluation.precision_recall(metrics, "x").alt
 
 
 def test_the_axes_of_a_group_begin_below_its_lowest_interval(metrics):
@@ -64,7 +64,32 @@ def test_the_axes_of_a_group_begin_below_its_lowest_interval(metrics):
     metrics.loc[hands, ["value", "low", "high"]] = [0.75, 0.65, 0.85]
     metrics.loc[~hands, ["value", "low", "high"]] = np.nan  # nobody counts
     axes = evaluation.precision_recall(metrics, "x").figure.axes
-    assert [axis.get_xlim()[0] for axis in axes] == pytest.approx([0, 0, 0.6, 0.6])
+    assert [axis.get_xlim()[0] for axis in axes] == pytest.approx([0, 0.6, 0, 0.6])
+
+
+def test_detectors_are_told_apart_without_colours(metrics):
+    table = metrics.assign(oks=metrics["value"])
+    for figure in (evaluation.precision_recall(metrics, "x"), evaluation.oks_curves(table, "x")):
+        axis = figure.figure.axes[0]
+        lines = [line for line in axis.get_lines() if line.get_marker() not in ("None", "")]
+        shapes = {(line.get_marker(), line.get_color()) for line in lines if len(line.get_xdata())}
+        assert shapes == {DETECTOR_STYLES[name][::-1] for name in ("mediapipe", "openpose-mobilenet")}
+
+
+def test_an_example_has_the_truth_and_says_who_is_not_found(tmp_path):
+    write_png(tmp_path / "1.png", np.zeros((60, 60, 3), np.uint8))
+    truth = make_annotations(np.full((1, 136, 2), 30.0), [1])
+    there = Detections(np.full((1, 136, 2), 30.0), np.ones((1, 136)), np.ones(1))
+    oks = pd.DataFrame(
+        {"group": "body", "detector": ["posenet", "mmpose"], "image_id": 1, "oks": [0.87, 0.0]}
+    )
+    figure = evaluation.example(
+        tmp_path, truth, 1, {"posenet": {1: there}, "mmpose": {}}, oks, "made-up people"
+    )
+    titles = [axis.get_title(loc="center") for axis in figure.figure.axes]
+    assert titles == ["annotated", "posenet\nOKS 0.87", "mmpose\nnothing found"]
+    assert all(axis.images for axis in figure.figure.axes)
+    assert "posenet: OKS 0.87 and mmpose: nothing found" in figure.alt
 
 
 @pytest.mark.parametrize("oks", [[0.0, 0.05], [0.0, 0.95], [0.5, 0.95]], ids=["nobody", "one", "both"])
@@ -83,7 +108,7 @@ def test_found_and_placed_are_side_by_side_for_who_is_found(oks):
     share = len(of_found) / len(oks)
     assert found == pytest.approx([1.0, share])
     assert placed == pytest.approx([0.9, sum(of_found) / len(of_found)] if of_found else [0.9])
-    assert f"posenet {share:.2f} on headless" in figure.alt
+    assert f"posenet {share:.0%} (headless body)" in figure.alt
 
 
 def test_the_share_of_people_falls_with_oks():
@@ -92,7 +117,7 @@ def test_the_share_of_people_falls_with_oks():
     )
     line = evaluation.oks_curves(table, "x").figure.axes[0].get_lines()[0]
     heights = np.array(line.get_ydata())
-    assert heights[0] == 1 and heights[-1] == 0 and (np.diff(heights) <= 0).all()
+    assert heights[0] == 0.75 and heights[-1] == 0 and (np.diff(heights) <= 0).all()
 
 
 def test_times_are_in_milliseconds_from_zero():
