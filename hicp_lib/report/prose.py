@@ -4,11 +4,14 @@ In a page of `book/`, between double braces:
 
     value("02_evaluation_2d", "body_ap", digits=2)    a recorded value; "not run" when it is None
     table("02_evaluation_2d", "ap", columns=[...])    a saved table in Markdown
+    rows("02_evaluation_2d", "head_loss_table")       a saved table's rows, for sentences; what is missing is None
     figure("02_evaluation_2d", "precision_recall")    a saved figure with its caption and alt text
     stamp("02_evaluation_2d")                         what a notebook was made with, its `provenance.json`
     profile                                           "quick" or "full"
     notebooks                                         names of the notebooks that were run
     data("paper.json")                                a JSON file of `data/`, for loops over its rows
+    choices()                                         which detector for which task, in Markdown
+    label("combined:posenet+mediapipe-hands")         a detector's name in plain words
     repetition()                                      this run beside the profile's reference run
 
 A name that no result file has stops the build. Texts are shown as they are, whatever is in them; what is
@@ -29,6 +32,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.escape import escaped
 from hicp_lib.core.files import read_json
 from hicp_lib.report import repetition
+from hicp_lib.study.choices import choices, label
 
 NOT_RUN = "not run"
 _MOST_SHOWN = 20  # outputs that differ from the reference run's
@@ -92,11 +96,17 @@ class Results:
         InputError
             If the notebook saved no such table.
         """
-        path = self.folder / notebook / f"{name}.parquet"
-        if not path.is_file():
-            raise InputError(f"{path}: a page of the book needs this table; save it in the notebook")
-        table = pd.read_parquet(path)
+        table = self._table(notebook, name)
         return markdown_table(table[columns] if columns else table, digits)
+
+    def rows(self, notebook: str, name: str) -> list[dict[str, Any]]:
+        """The rows of a saved table, by column; what is missing is None."""
+        table = self._table(notebook, name).astype(object)
+        return table.where(table.notna(), None).to_dict("records")
+
+    def choices(self) -> Markup:
+        """Which detector for which task, by the numbers of this run, as a table in Markdown."""
+        return markdown_table(choices(self.folder))
 
     def figure(self, notebook: str, name: str) -> Markup:
         """A saved figure as HTML, with a link to the notebook that made it."""
@@ -139,6 +149,12 @@ class Results:
             "n_outside": len(outside),
             "left_out": left_out,
         }
+
+    def _table(self, notebook: str, name: str) -> pd.DataFrame:
+        path = self.folder / notebook / f"{name}.parquet"
+        if not path.is_file():
+            raise InputError(f"{path}: a page of the book needs this table; save it in the notebook")
+        return pd.read_parquet(path)
 
     def _entry(self, notebook: str, file: str, name: str) -> Any:
         path = self.folder / notebook / file
@@ -192,10 +208,10 @@ def render_page(source: Path, results: Results, profile: str) -> str:
     """
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.finalize = lambda value: escaped(value) if type(value) is str else value  # not of Markup
-    offered = ("value", "raw", "table", "figure", "stamp", "repetition")
+    offered = ("value", "raw", "table", "rows", "figure", "stamp", "choices", "repetition")
     names = {name: getattr(results, name) for name in offered}
     names |= {"data": lambda name: json.loads((DATA_DIR / name).read_text())}
-    names |= {"profile": profile, "notebooks": results.notebooks()}
+    names |= {"profile": profile, "notebooks": results.notebooks(), "label": label}
     try:
         return environment.from_string(source.read_text()).render(names)
     except jinja2.TemplateError as error:
