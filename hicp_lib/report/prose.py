@@ -4,13 +4,12 @@ In a page of `book/`, between double braces:
 
     value("02_evaluation_2d", "body_ap", digits=2)    a recorded value; "not run" when it is None
     table("02_evaluation_2d", "ap", columns=[...])    a saved table in Markdown
-    rows("02_evaluation_2d", "head_loss_table")       a saved table's rows, for sentences; what is missing is None
+    rows("02_evaluation_2d", "head_loss_table")       a saved table's rows; what is missing is None
     figure("02_evaluation_2d", "precision_recall")    a saved figure with its caption and alt text
     stamp("02_evaluation_2d")                         what a notebook was made with, its `provenance.json`
     profile                                           "quick" or "full"
     notebooks                                         names of the notebooks that were run
     data("paper.json")                                a JSON file of `data/`, for loops over its rows
-    choices()                                         which detector for which task, in Markdown
     label("combined:posenet+mediapipe-hands")         a detector's name in plain words
     repetition()                                      this run beside the profile's reference run
 
@@ -31,8 +30,8 @@ from hicp_lib.core.datafiles import DATA_DIR, REFERENCE_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.escape import escaped
 from hicp_lib.core.files import read_json
+from hicp_lib.detectors.registry import COMBINED, DETECTORS
 from hicp_lib.report import repetition
-from hicp_lib.study.choices import choices, label
 
 NOT_RUN = "not run"
 _MOST_SHOWN = 20  # outputs that differ from the reference run's
@@ -104,10 +103,6 @@ class Results:
         table = self._table(notebook, name).astype(object)
         return table.where(table.notna(), None).to_dict("records")
 
-    def choices(self) -> Markup:
-        """Which detector for which task, by the numbers of this run, as a table in Markdown."""
-        return markdown_table(choices(self.folder))
-
     def figure(self, notebook: str, name: str) -> Markup:
         """A saved figure as HTML, with a link to the notebook that made it."""
         texts = self._entry(notebook, "captions.json", name)
@@ -165,6 +160,18 @@ class Results:
         return entries[name]
 
 
+def label(detector: str) -> str:
+    """A detector's name in plain words.
+
+    Examples
+    --------
+    >>> label("combined:movenet-thunder+mediapipe-hands"), label("mine")
+    ('MoveNet Thunder + MediaPipe Hands', 'mine')
+    """
+    parts = detector.removeprefix(COMBINED).split("+")
+    return " + ".join(DETECTORS[part].label if part in DETECTORS else part for part in parts)
+
+
 def markdown_table(table: pd.DataFrame, digits: int = 2) -> Markup:
     """A table in Markdown, numbers rounded to `digits` decimals; what is missing is a dash.
 
@@ -208,7 +215,7 @@ def render_page(source: Path, results: Results, profile: str) -> str:
     """
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.finalize = lambda value: escaped(value) if type(value) is str else value  # not of Markup
-    offered = ("value", "raw", "table", "rows", "figure", "stamp", "choices", "repetition")
+    offered = ("value", "raw", "table", "rows", "figure", "stamp", "repetition")
     names = {name: getattr(results, name) for name in offered}
     names |= {"data": lambda name: json.loads((DATA_DIR / name).read_text())}
     names |= {"profile": profile, "notebooks": results.notebooks(), "label": label}

@@ -10,14 +10,13 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots.people import detections_grid
-from hicp_lib.study.plots.style import Figure, in_style, texts
+from hicp_lib.study.plots.style import Figure, in_style, series_text, texts
 
 _ROWS = {"basic": "whole", "headless": "head cut off"}
-_MIN_SCORE = 0.3
+_MIN_SCORE = 0.1
 _TEXT_PT = 1.75  # per inch of the figure's width: legible on a phone, too
 
 
-@in_style
 def same_person(
     oks: pd.DataFrame,
     folders: Mapping[str, Path],
@@ -40,28 +39,28 @@ def same_person(
     note : str
         What the data are, for the caption.
     """
-    bodies = oks[oks["group"] == "body"].groupby(["image_id", "detector", "subset"], sort=False)["oks"].max()
-    by_subset = bodies.unstack().reindex(columns=list(_ROWS))
-    losses = (by_subset["basic"] - by_subset["headless"]).groupby("image_id").mean().dropna()
-    ranked = losses.sort_values(kind="stable").index
-    image_id = ranked[len(ranked) // 2] if len(ranked) else min(truth["basic"].images)
-    of_person = by_subset.reindex(columns=[s for s in _ROWS if image_id in truth[s].images]).loc[image_id]
-    pictures, titles = {}, []
-    for subset, values in of_person.items():
-        image = read_image(Path(folders[subset]) / "images" / truth[subset].images[image_id].file_name)
-        seen = {name: found[subset, name].get(image_id, Detections.none()) for name in values.index}
-        told = [f"OKS {values[name]:.2f}" if len(seen[name]) else "nobody found" for name in seen]
-        titles += told if titles else [f"{name}\n{text}" for name, text in zip(seen, told, strict=True)]
-        pictures[_ROWS[subset]] = image, seen
-    said = [
-        f"{name} {' and '.join(f'{value:.2f}' for value in row)}" for name, *row in of_person.itertuples()
-    ]
-    words = texts(
-        "same_person", min_score=_MIN_SCORE, n=len(ranked), said=said, rows=list(pictures), note=note
-    )
+    bodies = oks[(oks["group"] == "body") & oks["subset"].isin(list(_ROWS))]
+    both = bodies.groupby(["image_id", "detector", "subset"], sort=False)["oks"].max().unstack()
+    return _drawn(both.reindex(columns=list(_ROWS)).dropna(), folders, truth, found, note)
+
+
+@in_style
+def _drawn(oks: pd.DataFrame, folders, truth, found, note: str) -> Figure:
+    """`oks` by image id and detector, a column per subset; the rest as for `same_person`."""
+    losses = (oks["basic"] - oks["headless"]).groupby("image_id").mean().sort_values(kind="stable")
+    shown = losses.index[len(losses) // 2]
+    of_shown = oks.loc[shown]
+    pictures, titles, said = {}, [], []
+    for subset, row in _ROWS.items():
+        image = read_image(Path(folders[subset]) / "images" / truth[subset].images[shown].file_name)
+        seen = {name: found[subset, name].get(shown, Detections.none()) for name in of_shown.index}
+        pictures[row] = image, seen
+        titles += [f"{name}\nOKS {value:.2f}" for name, value in of_shown[subset].items()]
+        said.append(f"{row}, {series_text(of_shown[subset])}")
     figure = detections_grid(pictures, _MIN_SCORE)
     size_pt = _TEXT_PT * figure.figure.get_figwidth()
-    for axis, title in zip(figure.figure.axes, titles, strict=False):
+    for axis, title in zip(figure.figure.axes, titles, strict=True):
         axis.set_title(title.replace("-", "-\n"), fontsize=size_pt, loc="center")
         axis.yaxis.label.set_fontsize(size_pt)
-    return replace(figure, caption=words[0], alt=words[1])
+    caption, alt = texts("same_person", min_score=_MIN_SCORE, n=len(losses), said="; ".join(said), note=note)
+    return replace(figure, caption=caption, alt=alt)
