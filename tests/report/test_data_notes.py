@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import nbformat
 import pytest
 
@@ -33,6 +31,6 @@ def test_the_line_under_a_title(tmp_path, parameters, note, expected):
     write_json(folder / "values.json", {"n": 1} | ({"data_note": note} if note else {}))
     write_json(folder / "provenance.json", {"parameters": parameters})
     text = _with_data_note(executed, Results(tmp_path / "results", "quick"))
-    lines = nbformat.from_dict(json.loads(text)).cells[0].source.split("\n")
+    lines = nbformat.reads(text, as_version=4).cells[0].source.split("\n")
     assert lines[:3] == ["# About 05_tiny", "", expected]
     assert lines[-1] == "With $x^2$."
