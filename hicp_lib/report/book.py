@@ -138,7 +138,7 @@ def _with_data_note(executed: Path, results: Results) -> str:
     if note:
         looked = results.stamp(executed.stem)["parameters"].keys() & {"detector", "detectors", "body"}
         title, _, rest = whole.cells[0].source.partition("\n")
-        line = escaped(f"Real detectors · {note}" if looked else note[0].upper() + note[1:])
+        line = f"Real detectors · {escaped(note)}" if looked else escaped(note[0].upper() + note[1:])
         whole.cells[0].source = f"{title}\n\n**{line}**\n{rest}"
     return nbformat.writes(whole)
 
