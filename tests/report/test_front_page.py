@@ -239,9 +239,11 @@ def test_the_robot_is_late_where_hardly_anybody_is_kept_away(run):
 def test_the_near_subset_and_photographs_are_told_where_there_are_some(run):
     run.values(MAIN, data_note="rendered", near_note="9 people, 1.0 m away", median_time_ms={})
     run.table(MAIN, "found_and_placed", [FOUND | {"subset": "near", "detector": "a", "value": 0.7}])
+    run.table(MAIN, "by_definition", [PLAIN | {"subset": "near", "detector": "a"} | between(0.6)])
     run.values(PHOTOGRAPHS, n_photographs=27)
     taus = {"basic": 0.8, "headless": 1.0}
     run.table(PHOTOGRAPHS, "agreement", [{"subset": s, "n_detectors": 5, "tau": t} for s, t in taus.items()])
     page = run.page()
     assert "**As near as a robot's hand reaches,** a finds 70 % of people (9 people, 1.0 m away)." in page
+    assert "| body, near | a | AP 0.60 [0.55, 0.65] |" in page
     assert "is 0.80 with heads and 1.00 without heads." in page
