@@ -17,7 +17,7 @@ from hicp_lib.core.cache import files_below
 from hicp_lib.core.children import child_environment, lifeline
 from hicp_lib.core.datafiles import REFERENCE_DIR
 from hicp_lib.core.escape import escaped
-from hicp_lib.core.files import sha256_file, write_json
+from hicp_lib.core.files import read_json, sha256_file, write_json
 from hicp_lib.report.checks import book_problems
 from hicp_lib.report.prose import Results, render_page
 from hicp_lib.report.run import Folders, RunError
@@ -122,13 +122,25 @@ def _assemble(source: Path, folders: Folders, left_out: Mapping[str, str]) -> No
     notebooks = source / "notebooks"
     notebooks.mkdir(exist_ok=True)
     for executed in folders.executed.glob("*.ipynb"):
-        (notebooks / executed.name).write_text(executed.read_text().replace(*_LINK_TO_PAGE))
+        (notebooks / executed.name).write_text(_with_data_note(executed, results).replace(*_LINK_TO_PAGE))
     for name, reason in left_out.items():
         _write_stub(folders.sources / "notebooks" / f"{name}.ipynb", notebooks / f"{name}.ipynb", reason)
     scripts = source / SCRIPTS_DIR
     scripts.mkdir()
     for package, path, name in _SCRIPTS:
         shutil.copy(str(importlib.resources.files(package) / path), scripts / name)
+
+
+def _with_data_note(executed: Path, results: Results) -> str:
+    """An executed notebook, with a line under its title on what of its run is real and what is simulated."""
+    whole = nbformat.read(executed, as_version=4)
+    note = read_json(results.folder / executed.stem / "values.json").get("data_note")
+    if note:
+        looked = results.stamp(executed.stem)["parameters"].keys() & {"detector", "detectors", "body"}
+        title, _, rest = whole.cells[0].source.partition("\n")
+        line = f"Real detectors · {escaped(note)}" if looked else escaped(note[0].upper() + note[1:])
+        whole.cells[0].source = f"{title}\n\n**{line}**\n{rest}"
+    return nbformat.writes(whole)
 
 
 def _write_stub(original: Path, stub: Path, reason: str) -> None:

@@ -4,11 +4,13 @@ In a page of `book/`, between double braces:
 
     value("02_evaluation_2d", "body_ap", digits=2)    a recorded value; "not run" when it is None
     table("02_evaluation_2d", "ap", columns=[...])    a saved table in Markdown
+    rows("02_evaluation_2d", "head_loss_table")       a saved table's rows; what is missing is None
     figure("02_evaluation_2d", "precision_recall")    a saved figure with its caption and alt text
     stamp("02_evaluation_2d")                         what a notebook was made with, its `provenance.json`
     profile                                           "quick" or "full"
     notebooks                                         names of the notebooks that were run
     data("paper.json")                                a JSON file of `data/`, for loops over its rows
+    label("combined:posenet+mediapipe-hands")         a detector's name in plain words
     repetition()                                      this run beside the profile's reference run
 
 A name that no result file has stops the build. Texts are shown as they are, whatever is in them; what is
@@ -28,6 +30,7 @@ from hicp_lib.core.datafiles import DATA_DIR, REFERENCE_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.escape import escaped
 from hicp_lib.core.files import read_json
+from hicp_lib.detectors.registry import COMBINED, DETECTORS
 from hicp_lib.report import repetition
 
 NOT_RUN = "not run"
@@ -92,11 +95,13 @@ class Results:
         InputError
             If the notebook saved no such table.
         """
-        path = self.folder / notebook / f"{name}.parquet"
-        if not path.is_file():
-            raise InputError(f"{path}: a page of the book needs this table; save it in the notebook")
-        table = pd.read_parquet(path)
+        table = self._table(notebook, name)
         return markdown_table(table[columns] if columns else table, digits)
+
+    def rows(self, notebook: str, name: str) -> list[dict[str, Any]]:
+        """The rows of a saved table, by column; what is missing is None."""
+        table = self._table(notebook, name).astype(object)
+        return table.where(table.notna(), None).to_dict("records")
 
     def figure(self, notebook: str, name: str) -> Markup:
         """A saved figure as HTML, with a link to the notebook that made it."""
@@ -140,6 +145,12 @@ class Results:
             "left_out": left_out,
         }
 
+    def _table(self, notebook: str, name: str) -> pd.DataFrame:
+        path = self.folder / notebook / f"{name}.parquet"
+        if not path.is_file():
+            raise InputError(f"{path}: a page of the book needs this table; save it in the notebook")
+        return pd.read_parquet(path)
+
     def _entry(self, notebook: str, file: str, name: str) -> Any:
         path = self.folder / notebook / file
         entries = read_json(path)
@@ -147,6 +158,18 @@ class Results:
             known = ", ".join(entries) or "none"
             raise InputError(f"{path}: a page of the book needs '{name}'; the notebook recorded {known}")
         return entries[name]
+
+
+def label(detector: str) -> str:
+    """A detector's name in plain words.
+
+    Examples
+    --------
+    >>> label("combined:movenet-thunder+mediapipe-hands"), label("mine")
+    ('MoveNet Thunder + MediaPipe Hands', 'mine')
+    """
+    parts = detector.removeprefix(COMBINED).split("+")
+    return " + ".join(DETECTORS[part].label if part in DETECTORS else part for part in parts)
 
 
 def markdown_table(table: pd.DataFrame, digits: int = 2) -> Markup:
@@ -192,10 +215,10 @@ def render_page(source: Path, results: Results, profile: str) -> str:
     """
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.finalize = lambda value: escaped(value) if type(value) is str else value  # not of Markup
-    offered = ("value", "raw", "table", "figure", "stamp", "repetition")
+    offered = ("value", "raw", "table", "rows", "figure", "stamp", "repetition")
     names = {name: getattr(results, name) for name in offered}
     names |= {"data": lambda name: json.loads((DATA_DIR / name).read_text())}
-    names |= {"profile": profile, "notebooks": results.notebooks()}
+    names |= {"profile": profile, "notebooks": results.notebooks(), "label": label}
     try:
         return environment.from_string(source.read_text()).render(names)
     except jinja2.TemplateError as error:

@@ -1,0 +1,50 @@
+"""What the README says was found is what the committed reference run found."""
+
+from __future__ import annotations
+
+import re
+
+import pandas as pd
+
+from hicp_lib.core.checkout import CHECKOUT
+from hicp_lib.core.datafiles import REFERENCE_DIR
+from hicp_lib.core.files import read_json
+
+FULL = REFERENCE_DIR / "full"
+README = " ".join((CHECKOUT / "README.md").read_text().split())
+
+
+def medians_cm(lifting: str, joint: str) -> str:
+    """The range of the medians of this study's detectors, of cells such as "392 / 2.0 [1.6, 2.6]"."""
+    table = pd.read_parquet(FULL / "04_mocap_3d" / "table_four.parquet")
+    ours = table[~table["detector"].str.contains("paper|perfect") & (table["lifting"] == lifting)]
+    cells = ours[[f"left {joint}", f"right {joint}"]].to_numpy().ravel()
+    values_cm = sorted(float(re.match(r"\d+ / ([\d.]+)", cell)[1]) for cell in cells)
+    return f"{values_cm[0]} to {values_cm[-1]}"
+
+
+def test_losses_without_the_head():
+    losses = pd.read_parquet(FULL / "02_evaluation_2d" / "head_loss_table.parquet").query("group == 'body'")
+    losses = losses.sort_values("change").set_index("detector")
+    assert losses.index[0] == "mediapipe" and losses.index[-1] == "movenet-thunder" and len(losses) == 5
+    told = {name: f"from {row.basic:.2f} to {row.headless:.2f}" for name, row in losses.iterrows()}
+    assert f"With the heads of the same {losses['n_people'].iloc[0]} people cut off" in README
+    assert f"precision of bodies falls {told['mediapipe']} for MediaPipe, most of five detectors" in README
+    assert f"and {told['movenet-thunder']} for MoveNet Thunder, least." in README
+
+
+def test_invented_heads():
+    invented = read_json(FULL / "05_failure_analysis" / "values.json")["invented_heads"]
+    shares = {name: share for name, share, *_ in map(str.split, invented)}
+    assert f"puts a head into the picture for {shares['movenet-thunder']} % of these people" in README
+    assert f"MediaPipe for {shares['mediapipe']} % and OpenPose's method" in README
+    assert f"on a small network for {shares['openpose-mobilenet']} %." in README
+
+
+def test_distances_in_space():
+    floor_cm = read_json(FULL / "04_mocap_3d" / "values.json")["floor_cm"]
+    theirs = {joint: medians_cm("paper", joint) for joint in ("wrist", "elbow")}
+    below_skin = {joint: medians_cm("robust", joint) for joint in ("wrist", "elbow")}
+    assert f"wrists are {theirs['wrist']} cm from motion capture and elbows {theirs['elbow']} cm" in README
+    assert f"for perfect keypoints it would be {floor_cm} cm" in README
+    assert f"below the skin leaves {below_skin['wrist']} and {below_skin['elbow']} cm." in README
