@@ -1,0 +1,128 @@
+// People in space, frame by frame: what the camera saw, and bodies (and the robot) to turn.
+"use strict";
+const HICP_BODIES = {truth: "#111", paper: "#D55E00", robust: "#0072B2"};
+
+/** A view of space along the horizon, from a bit above: places in mm (x backward, y right, z up) on a screen. */
+function hicpView(turn_deg) {
+  const [turn, up] = [turn_deg * Math.PI / 180, 0.25];
+  const [c, s, cu, su] = [Math.cos(turn), Math.sin(turn), Math.cos(up), Math.sin(up)];
+  return (x, y, z) => [c * y - s * x, -(z * cu - (c * x + s * y) * su)];
+}
+
+/** Bodies, flat lists of index, x, y, z and score, as they appear in a view, for `hicpPeople`. */
+function hicpSeen(bodies, view) {
+  return bodies.map(flat => {
+    const seen = [];
+    for (let k = 0; k < flat.length; k += 5) seen.push(flat[k], ...view(...flat.slice(k + 1, k + 4)), 0.5);
+    return seen;
+  });
+}
+
+/** The robot's parts as thick lines, and threatened taxels as red dots. */
+function hicpRobot({robot, taxels}, radii, view) {
+  const parts = robot.map((ends, k) => {
+    const [[x1, y1], [x2, y2]] = [view(...ends.slice(0, 3)), view(...ends.slice(3))];
+    return hicpMake("svg:line", {x1, y1, x2, y2, stroke: "#9aa5b1", "stroke-width": 2 * radii[k], "stroke-linecap": "round"});
+  });
+  const dots = [];
+  for (const flat of taxels)
+    for (let k = 0; k < flat.length; k += 5) {
+      const [cx, cy] = view(...flat.slice(k + 1, k + 4)), share = Math.min(1, flat[k + 4] / 0.5);
+      dots.push(hicpMake("svg:circle", {cx, cy, r: 6 + 14 * share, fill: "#c0392b", "fill-opacity": 0.3 + 0.7 * share}));
+    }
+  return [...parts, ...dots];
+}
+
+hicpExplorers.films = (place, data, folder) => {
+  const [width, height] = data.size, keys = Object.keys(data.films[0]).filter(key => !["file", "sheet"].includes(key));
+  const chosen = {...data.films[0]}, words = hicpMake("p", {"aria-live": "off"});
+  const camera = hicpMake("div", {class: "hicp-picture"}), space = hicpMake("div", {class: "hicp-picture"});
+  let [film, at, turn_deg, timer] = [null, 0, 30, null];
+
+  const frameAt = t => film.frames.findLastIndex(frame => frame.t <= t + 1e-6);
+  const draw = () => {
+    const step = film.steps[at], k = frameAt(step.t), frame = film.frames[k];
+    const style = data.detectors.find(({name}) => name === chosen.detector);
+    const colours = {...HICP_BODIES, perceived: style.colour}, view = hicpView(turn_deg);
+    const [column, row] = [Math.max(k, 0) % data.columns, Math.floor(Math.max(k, 0) / data.columns)];
+    const sheet = hicpMake("svg:image", {
+      href: `${folder}/${chosen.sheet}`, x: -column * width, y: -row * height, width: data.columns * width,
+      height: Math.ceil(film.frames.length / data.columns) * height,
+    });
+    const alt = `The camera's picture ${k + 1} with what ${chosen.detector} finds`;
+    camera.replaceChildren(hicpMake("svg:svg", {viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": alt},
+      ...(frame ? [sheet, hicpPeople(frame.found, data.limbs, style, 0.3, 1.2)] : [])));
+    const bodies = frame ? Object.entries(frame.bodies).filter(([name]) => legend.isShown({name})) : [];
+    const drawn = bodies.map(([name, of]) => hicpPeople(
+      hicpSeen(of, view), data.limbs, {colour: colours[name], marker: "o"}, 0, 9, name === "truth" ? "#fff" : "#141414"));
+    space.replaceChildren(hicpMake("svg:svg", {viewBox: film.box, role: "img", "aria-label": "The same in space"},
+      ...(step.robot ? hicpRobot(step, data.radii, view) : []), ...drawn));
+    const told = step.robot ? `: nearest ${(100 * step.distance).toFixed(1)} cm, activation ${step.activation.toFixed(2)}` : "";
+    words.textContent = `${step.t.toFixed(1)} s${told}.`;
+    time.set(at);
+  };
+  const stop = () => {
+    clearTimeout(timer);
+    timer = null;
+    play.textContent = "▶ Play";
+  };
+  const next = () => {
+    at = (at + 1) % film.steps.length;
+    draw();
+    const wait_s = at + 1 < film.steps.length ? film.steps[at + 1].t - film.steps[at].t : 1;
+    const slow = matchMedia("(prefers-reduced-motion: reduce)").matches ? 1 : wait_s;
+    timer = place.closest("details").open ? setTimeout(next, 1000 * slow) : stop();
+  };
+  const play = hicpMake("button", {type: "button", click: () => {
+    if (timer) return stop();
+    play.textContent = "❚❚ Pause";
+    next();
+  }}, "▶ Play");
+  const open = async () => {
+    stop();
+    Object.assign(chosen, data.films.find(one => keys.every(key => String(one[key]) === String(chosen[key]))));
+    film = await hicpLoad(`${folder}/${chosen.file}`);
+    film.steps ??= film.frames.map(({t}) => ({t}));
+    film.box ??= hicpBox(film);
+    at = Math.min(at, film.steps.length - 1);
+    time.input.max = film.steps.length - 1;
+    draw();
+  };
+  const choices = keys.map(key => {
+    const values = [...new Set(data.films.map(one => one[key]))];
+    return hicpSelect(key, values.map(value => [value, value]), chosen[key], value => {
+      chosen[key] = value;
+      open();
+    });
+  });
+  const time = hicpSlider("Time", 1, 0, k => film ? `${film.steps[k].t.toFixed(1)} s` : "", k => {
+    stop();
+    at = k;
+    draw();
+  });
+  const turn = hicpSlider("Turn", 360, turn_deg, k => `${k}°`, k => {
+    turn_deg = k;
+    draw();
+  });
+  const legend = hicpLegend(data.bodies.map(name => ({name, colour: HICP_BODIES[name] ?? "#888", marker: "o"})), [], () => draw());
+  place.append(
+    hicpMake("div", {class: "hicp-through"}, ...choices), hicpMake("div", {class: "hicp-through"}, play, time.element),
+    hicpMake("div", {class: "hicp-beside"}, camera, space), words,
+    hicpMake("div", {class: "hicp-beside"}, turn.element, legend.element));
+  open();
+};
+
+/** A frame for all that a film shows, whichever way it is turned. */
+function hicpBox(film) {
+  let [radius, low, high] = [1, 0, 0];
+  const take = (x, y, z) => {
+    radius = Math.max(radius, Math.hypot(x, y));
+    [low, high] = [Math.min(low, z), Math.max(high, z)];
+  };
+  for (const {bodies} of film.frames)
+    for (const flat of Object.values(bodies).flat())
+      for (let k = 0; k < flat.length; k += 5) take(...flat.slice(k + 1, k + 4));
+  for (const {robot} of film.steps)
+    for (const ends of robot ?? []) take(...ends.slice(0, 3));
+  return `${-radius} ${-high - 100} ${2 * radius} ${high - low + 0.5 * radius + 200}`;
+}

@@ -1,0 +1,146 @@
+"""What readers play in space: runs of avoidance, and lifted keypoints frame by frame.
+
+Functions return what those of `hicp_lib.study.explore` do. A film is a script with its frames (a picture,
+people found in it, bodies in space) and, where the robot moves, its steps. Places in space are whole
+millimetres in the robot's base frame.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from PIL import Image
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import BODY, HANDS, INDEX, N_KEYPOINTS
+from hicp_lib.evaluation.space.stability import POSITION
+from hicp_lib.experiments.avoidance.closed_loop import start_posture
+from hicp_lib.experiments.avoidance.runs import Run, image
+from hicp_lib.recordings.recording import Recording, read_rgb, read_truth
+from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
+from hicp_lib.robot.segments import body_segments
+from hicp_lib.robot.skin import read_skin
+from hicp_lib.study.avoidance import sure_keypoints
+from hicp_lib.study.explore import Explored, flat, spread, styles, webp
+from hicp_lib.study.page import as_script
+
+_COLUMNS = 8  # of the sheet of a film's pictures
+_PICTURE_PX = (240, 180)
+TRUTH, _PERCEIVED = "truth", "perceived"
+_THREATENED = 0.05  # activation from which a taxel is drawn
+_STEP_S = 0.1
+_FACELESS = np.isin(np.arange(N_KEYPOINTS), np.r_[BODY, HANDS]).astype(float)
+
+
+def runs(chosen: Iterable[Run]) -> Explored:
+    """Runs of avoidance: the person as they are and as perceived, the robot and its threatened taxels.
+
+    Parameters
+    ----------
+    chosen : iterable of Run
+        Those without images are left out.
+
+    Returns
+    -------
+    dict of str to object
+    dict of str to bytes
+    """
+    films: list[dict[str, Any]] = []
+    files: dict[str, bytes] = {}
+    for run in (run for run in chosen if len(run.frames)):
+        name, trial = f"film-{len(films)}", run.job.trial
+        films.append({"script": trial.script, "person": trial.subject.number, "detector": run.job.condition})
+        frames = [frame for _, frame in run.frames.iterrows()]
+        every = max(1, round(_STEP_S / run.cycles["t_s"].diff().median()))
+        steps = [_step(cycle) for _, cycle in run.cycles.iloc[::every].iterrows()]
+        files[f"{name}.js"] = as_script({"frames": list(map(_seen, frames)), "steps": steps})
+        files[f"{name}.webp"] = _sheet([image(frame)[0] for frame in frames])
+    radii_mm = [round(1000 * segment.radius_m) for segment in body_segments(load_icub(), start_posture())]
+    return _films(films, [_PERCEIVED]) | {"radii": radii_mm}, files
+
+
+def lifted(
+    recording: Recording, found: Mapping[str, Sequence[Detections]], points: pd.DataFrame, n_frames: int = 48
+) -> Explored:
+    """Keypoints of a recording by each method of lifting, a film per detector.
+
+    Parameters
+    ----------
+    recording : Recording
+    found : mapping of str to sequence of Detections
+        By detector, in every frame.
+    points : pd.DataFrame
+        As from `hicp_lib.lifting.table.lift_found`; the person with the best score is shown.
+    n_frames : int, optional
+        At most, evenly over the recording.
+
+    Returns
+    -------
+    dict of str to object
+    dict of str to bytes
+    """
+    frames, truth = spread(range(len(recording)), n_frames), read_truth(recording)
+    known = [] if truth is None else [truth.assign(score=1.0, method=TRUTH, person=0)]
+    times_s = (recording.times_s - recording.times_s[0]).round(3).tolist()
+    films: list[dict[str, Any]] = []
+    files = {"sheet.webp": _sheet([read_rgb(recording, frame) for frame in frames])}
+    for detector, seen in found.items():
+        rows = pd.concat([*known, points[points["detector"] == detector]])
+        placed = dict(iter(rows[rows["person"] == 0].groupby("frame")))
+        told = [
+            {"t": times_s[frame], "found": _in_picture(seen[frame], recording.intrinsics.width_px)}
+            | {"bodies": _bodies(placed.get(frame, rows[:0]))}
+            for frame in frames
+        ]
+        files[f"film-{len(films)}.js"] = as_script({"frames": told})
+        films.append({"detector": detector, "sheet": "sheet.webp"})
+    return _films(films, list(points["method"].unique())), files
+
+
+def _films(films: list[dict[str, Any]], bodies: Sequence[str]) -> dict[str, Any]:
+    listed = [{"file": f"film-{k}.js", "sheet": f"film-{k}.webp"} | film for k, film in enumerate(films)]
+    detectors = dict.fromkeys(film["detector"] for film in films)
+    return styles(detectors) | {"films": listed, "bodies": bodies, "size": _PICTURE_PX, "columns": _COLUMNS}
+
+
+def _seen(frame: pd.Series) -> dict[str, Any]:
+    (rgb, found), (points_m, is_sure, truth_m) = image(frame), sure_keypoints(frame)
+    true, perceived = flat(1000 * truth_m[None], _FACELESS[None], 0), flat(1000 * points_m, is_sure, 0)
+    shown = {"found": _in_picture(found, rgb.shape[1]), "bodies": {TRUTH: true, _PERCEIVED: perceived}}
+    return {"t": round(frame["t_s"], 3)} | shown
+
+
+def _step(cycle: pd.Series) -> dict[str, Any]:
+    posture = start_posture().moved("left", np.array([cycle[f"{joint}_rad"] for joint in ARM_JOINTS]))
+    ends_m = np.array([(part.start_m, part.end_m) for part in body_segments(load_icub(), posture)])
+    activations = np.asarray(cycle["activations"])[None]
+    threats = np.where(activations > _THREATENED, activations, 0)
+    taxels = flat(1000 * read_skin().in_root(load_icub(), posture)[0][None], threats, 0)
+    told = {"t": cycle["t_s"], "distance": cycle["distance_m"], "activation": cycle["activation"]}
+    shown = {"robot": (1000 * ends_m).round().astype(int).reshape(-1, 6), "taxels": taxels}
+    return {name: round(number, 3) for name, number in told.items()} | shown
+
+
+def _bodies(rows: pd.DataFrame) -> dict[str, list[list[float]]]:
+    """Keypoints in space by method, of the rows of one person in one frame."""
+    bodies = {}
+    for method, of in rows.groupby("method"):
+        places_m = np.full((N_KEYPOINTS, 3), np.nan)
+        places_m[of["keypoint"].map(INDEX)] = of[POSITION]
+        bodies[method] = flat(1000 * places_m[None], _FACELESS[None], 0)
+    return bodies
+
+
+def _in_picture(found: Detections, width_px: int) -> list[list[float]]:
+    return flat((found.keypoints_px + 0.5) * _PICTURE_PX[0] / width_px, found.scores)
+
+
+def _sheet(pictures: Sequence[np.ndarray]) -> bytes:
+    """Pictures made small, in rows of `_COLUMNS`."""
+    width_px, height_px = _PICTURE_PX
+    sheet = Image.new("RGB", (_COLUMNS * width_px, -(-len(pictures) // _COLUMNS) * height_px))
+    for k, picture in enumerate(pictures):
+        small = Image.fromarray(picture).resize(_PICTURE_PX, Image.Resampling.LANCZOS)
+        sheet.paste(small, (k % _COLUMNS * width_px, k // _COLUMNS * height_px))
+    return webp(sheet)
