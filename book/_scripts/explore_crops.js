@@ -37,7 +37,7 @@ hicpExplorers.crops = (place, data, folder) => {
     hicpMake("button", {type: "button", "aria-label": `${label} person`, click: () => go(at + by)}, sign);
 
   const slider = hicpSlider("Person", data.people.length - 1, 0, k => `${k + 1} of ${(people ?? data.people).length}`, go);
-  const legend = hicpLegend(data.detectors, ["OKS, body", "OKS, hands", "people found"], draw);
+  const legend = hicpLegend(data.detectors, ["OKS, body", "OKS, hands", "found"], draw);
   const titles = offered.map(name => [name, name[0].toUpperCase() + name.slice(1)]);
   const subsets = hicpPick("Data set", titles, subset, name => {
     subset = name;

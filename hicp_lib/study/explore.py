@@ -28,7 +28,7 @@ SAME_PEOPLE = ("basic", "headless")
 
 
 def crops(
-    folders: Mapping[str, Path], truth: Truth, found: Found, oks: pd.DataFrame, n_people: int = 48
+    folders: Mapping[str, Path], truth: Truth, found: Found, oks: pd.DataFrame, n_people: int = 60
 ) -> Explored:
     """People spread over the data set, in every subset they are in, as the detectors see them.
 

@@ -106,7 +106,8 @@ def _films(films: list[dict[str, Any]], bodies: Sequence[str]) -> dict[str, Any]
 
 def _seen(frame: pd.Series) -> dict[str, Any]:
     (rgb, found), (points_m, is_sure, truth_m) = image(frame), sure_keypoints(frame)
-    true, perceived = flat(1000 * truth_m[None], _FACELESS[None], 0), flat(1000 * points_m, is_sure, 0)
+    true = flat(1000 * truth_m[None], _FACELESS[None], 0)
+    perceived = flat(1000 * points_m, is_sure.astype(float), 0)
     shown = {"found": _in_picture(found, rgb.shape[1]), "bodies": {TRUTH: true, _PERCEIVED: perceived}}
     return {"t": round(frame["t_s"], 3)} | shown
 
