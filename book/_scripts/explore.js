@@ -111,7 +111,8 @@ function hicpLegend(styles, heads, change) {
       d: HICP_MARKS[marker] ?? HICP_MARKS.o, fill: colour, stroke: name === "truth" ? "#fff" : "#141414",
     });
     const swatch = hicpMake("svg:svg", {viewBox: "-2 -2 4 4", class: "hicp-swatch", "aria-hidden": "true"}, mark);
-    const label = hicpMake("label", {}, box, " ", swatch, ` ${name}`);
+    const pieces = name.split(/(?<=[:+])/).flatMap(piece => [piece, hicpMake("wbr")]);
+    const label = hicpMake("label", {}, box, " ", swatch, " ", ...pieces);
     const cells = heads.map(() => hicpMake("td", {}, name === "truth" ? "" : "–"));
     rows[name] = hicpMake("tr", {}, hicpMake("th", {scope: "row"}, label), ...cells);
   }

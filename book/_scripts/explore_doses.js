@@ -10,10 +10,10 @@ hicpExplorers.doses = (place, data, folder) => {
     const alt = `Person ${person + 1} at ${level}, with what is detected`;
     picture.replaceChildren(
       hicpPicture(`${folder}/${view.file}`, view.size, alt, hicpLayers(view, data, legend, minScore)));
-    const said = bounds => bounds && `${bounds[0].toFixed(2)} [${bounds.slice(1).map(x => x?.toFixed(2) ?? "–").join(", ")}]`;
+    const said = ([value, ...ends]) => value.toFixed(2) + (ends.includes(null) ? "" : ` [${ends.map(x => x.toFixed(2)).join(", ")}]`);
     for (const {name} of data.detectors) {
       const {body, hand} = dose.ap[at][name] ?? {};
-      legend.fill(name, [said(body), said(hand), view.found[name]?.length]);
+      legend.fill(name, [body && said(body), hand && said(hand), view.found[name]?.length]);
     }
     words.textContent = `Person ${person + 1} at ${level}.`;
   };

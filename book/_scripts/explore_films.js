@@ -1,12 +1,16 @@
 // People in space, frame by frame: what the camera saw, and bodies (and the robot) to turn.
 "use strict";
+const HICP_FROM_ABOVE_RAD = 0.25;
 const HICP_BODIES = {truth: "#111", paper: "#D55E00", robust: "#0072B2"};
 
 /** A view of space along the horizon, from a bit above: places in mm (x backward, y right, z up) on a screen. */
-function hicpView(turn_deg) {
-  const [turn, up] = [turn_deg * Math.PI / 180, 0.25];
+function hicpView(turn_deg, centre) {
+  const [turn, up] = [turn_deg * Math.PI / 180, HICP_FROM_ABOVE_RAD];
   const [c, s, cu, su] = [Math.cos(turn), Math.sin(turn), Math.cos(up), Math.sin(up)];
-  return (x, y, z) => [c * y - s * x, -(z * cu - (c * x + s * y) * su)];
+  return (...place) => {
+    const [x, y, z] = place.map((at, k) => at - centre[k]);
+    return [c * y - s * x, -(z * cu - (c * x + s * y) * su)];
+  };
 }
 
 /** Bodies, flat lists of index, x, y, z and score, as they appear in a view, for `hicpPeople`. */
@@ -36,14 +40,14 @@ function hicpRobot({robot, taxels}, radii, view) {
 hicpExplorers.films = (place, data, folder) => {
   const [width, height] = data.size, keys = Object.keys(data.films[0]).filter(key => !["file", "sheet"].includes(key));
   const chosen = {...data.films[0]}, words = hicpMake("p", {"aria-live": "off"});
-  const camera = hicpMake("div", {class: "hicp-picture"}), space = hicpMake("div", {class: "hicp-picture"});
+  const camera = hicpMake("div"), space = hicpMake("div");
   let [film, at, turn_deg, timer] = [null, 0, 30, null];
 
   const frameAt = t => film.frames.findLastIndex(frame => frame.t <= t + 1e-6);
   const draw = () => {
     const step = film.steps[at], k = frameAt(step.t), frame = film.frames[k];
     const style = data.detectors.find(({name}) => name === chosen.detector);
-    const colours = {...HICP_BODIES, perceived: style.colour}, view = hicpView(turn_deg);
+    const colours = {...HICP_BODIES, perceived: style.colour}, view = hicpView(turn_deg, film.centre);
     const [column, row] = [Math.max(k, 0) % data.columns, Math.floor(Math.max(k, 0) / data.columns)];
     const sheet = hicpMake("svg:image", {
       href: `${folder}/${chosen.sheet}`, x: -column * width, y: -row * height, width: data.columns * width,
@@ -52,11 +56,12 @@ hicpExplorers.films = (place, data, folder) => {
     const alt = `The camera's picture ${k + 1} with what ${chosen.detector} finds`;
     camera.replaceChildren(hicpMake("svg:svg", {viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": alt},
       ...(frame ? [sheet, hicpPeople(frame.found, data.limbs, style, 0.3, 1.2)] : [])));
-    const bodies = frame ? Object.entries(frame.bodies).filter(([name]) => legend.isShown({name})) : [];
-    const drawn = bodies.map(([name, of]) => hicpPeople(
-      hicpSeen(of, view), data.limbs, {colour: colours[name], marker: "o"}, 0, 9, name === "truth" ? "#fff" : "#141414"));
-    space.replaceChildren(hicpMake("svg:svg", {viewBox: film.box, role: "img", "aria-label": "The same in space"},
-      ...(step.robot ? hicpRobot(step, data.radii, view) : []), ...drawn));
+    const names = ["truth", ...data.bodies].filter(name => frame?.bodies[name] && legend.isShown({name}));
+    const drawn = names.map(name => hicpPeople(
+      hicpSeen(frame.bodies[name], view), data.limbs, {colour: colours[name], marker: "o"}, 0, film.half / 90, name === "truth" ? "#fff" : "#141414"));
+    const box = [-1, -0.75, 2, 1.5].map(share => share * film.half).join(" ");
+    space.replaceChildren(hicpMake("svg:svg", {viewBox: box, role: "img", "aria-label": "The same in space"},
+      ...hicpScale(film.half), ...(step.robot ? hicpRobot(step, data.radii, view) : []), ...drawn));
     const told = step.robot ? `: nearest ${(100 * step.distance).toFixed(1)} cm, activation ${step.activation.toFixed(2)}` : "";
     words.textContent = `${step.t.toFixed(1)} s${told}.`;
     time.set(at);
@@ -83,14 +88,14 @@ hicpExplorers.films = (place, data, folder) => {
     Object.assign(chosen, data.films.find(one => keys.every(key => String(one[key]) === String(chosen[key]))));
     film = await hicpLoad(`${folder}/${chosen.file}`);
     film.steps ??= film.frames.map(({t}) => ({t}));
-    film.box ??= hicpBox(film);
+    [film.centre, film.half] = hicpAim(film);
     at = Math.min(at, film.steps.length - 1);
     time.input.max = film.steps.length - 1;
     draw();
   };
   const choices = keys.map(key => {
     const values = [...new Set(data.films.map(one => one[key]))];
-    return hicpSelect(key, values.map(value => [value, value]), chosen[key], value => {
+    return hicpSelect(key[0].toUpperCase() + key.slice(1), values.map(value => [value, value]), chosen[key], value => {
       chosen[key] = value;
       open();
     });
@@ -105,24 +110,31 @@ hicpExplorers.films = (place, data, folder) => {
     draw();
   });
   const legend = hicpLegend(data.bodies.map(name => ({name, colour: HICP_BODIES[name] ?? "#888", marker: "o"})), [], () => draw());
+  const left = hicpMake("div", {class: "hicp-picture"}, camera, words, legend.element);
+  const right = hicpMake("div", {class: "hicp-picture"}, space, turn.element);
   place.append(
     hicpMake("div", {class: "hicp-through"}, ...choices), hicpMake("div", {class: "hicp-through"}, play, time.element),
-    hicpMake("div", {class: "hicp-beside"}, camera, space), words,
-    hicpMake("div", {class: "hicp-beside"}, turn.element, legend.element));
+    hicpMake("div", {class: "hicp-beside"}, left, right));
   open();
 };
 
-/** A frame for all that a film shows, whichever way it is turned. */
-function hicpBox(film) {
-  let [radius, low, high] = [1, 0, 0];
-  const take = (x, y, z) => {
-    radius = Math.max(radius, Math.hypot(x, y));
-    [low, high] = [Math.min(low, z), Math.max(high, z)];
-  };
+/** Where a film is looked at, and half the width of the view, in mm: on the true body, if it is known, and the robot. */
+function hicpAim(film) {
+  const places = film.steps.flatMap(({robot}) => (robot ?? []).map(ends => ends.slice(0, 3)));
   for (const {bodies} of film.frames)
-    for (const flat of Object.values(bodies).flat())
-      for (let k = 0; k < flat.length; k += 5) take(...flat.slice(k + 1, k + 4));
-  for (const {robot} of film.steps)
-    for (const ends of robot ?? []) take(...ends.slice(0, 3));
-  return `${-radius} ${-high - 100} ${2 * radius} ${high - low + 0.5 * radius + 200}`;
+    for (const flat of bodies.truth ?? Object.values(bodies).flat())
+      for (let k = 0; k < flat.length; k += 5) places.push(flat.slice(k + 1, k + 4));
+  const ranges = [0, 1, 2].map(axis => {  // some lifted points lie on the wall
+    const sorted = places.map(place => place[axis]).sort((a, b) => a - b), n = sorted.length - 1;
+    return n < 0 ? [-500, 500] : [sorted[Math.floor(0.02 * n)], sorted[Math.ceil(0.98 * n)]];
+  });
+  const [width, depth, height] = ranges.map(([low, high]) => (high - low) / 2), level = Math.hypot(width, depth);
+  return [ranges.map(([low, high]) => (low + high) / 2), 1.1 * Math.max(level, 4 / 3 * (height + level * HICP_FROM_ABOVE_RAD))];
+}
+
+/** A line of 20 cm in the lower left corner of a view. */
+function hicpScale(half) {
+  const [x, y] = [-0.95 * half, 0.7 * half], size = half / 16;
+  return [hicpMake("svg:path", {d: `M${x} ${y}h200`, stroke: "currentColor", "stroke-width": size / 6}),
+    hicpMake("svg:text", {x, y: y - size / 2, "font-size": size, fill: "currentColor"}, "20 cm")];
 }
