@@ -112,21 +112,6 @@ class Study:
             downloads += ["svg", "parquet", "csv"]
         self._show_image(name, content, figure.alt, figure.caption, downloads)
 
-    def animation(self, name: str, film: bytes, caption: str, alt: str) -> None:
-        """Save a film and show it with the browser's controls; nothing moves before a reader starts it.
-
-        Parameters
-        ----------
-        name : str
-        film : bytes
-            Content of an MP4 file.
-        caption, alt : str
-        """
-        write_bytes(self.folder / f"{name}.mp4", film)
-        words, source = escaped(alt), _inline("video/mp4", film)
-        body = f'<video controls loop muted playsinline aria-label="{words}" src="{source}">{words}</video>'
-        self._show_figure(name, body, caption, ["mp4"], file=f"{name}.mp4", alt=alt)
-
     def scene(self, name: str, scene: go.Figure, caption: str, alt: str) -> None:
         """Save an interactive 3D scene (its data as JSON) and show it.
 
