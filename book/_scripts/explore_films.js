@@ -83,9 +83,12 @@ hicpExplorers.films = (place, data, folder) => {
     play.textContent = "❚❚ Pause";
     next();
   }}, "▶ Play");
-  const open = async () => {
+  const open = async (key, value) => {  // the film with this choice that shares most of the others
     stop();
-    Object.assign(chosen, data.films.find(one => keys.every(key => String(one[key]) === String(chosen[key]))));
+    const agrees = one => keys.filter(other => one[other] === chosen[other]).length;
+    const possible = data.films.filter(one => key === undefined || String(one[key]) === value);
+    Object.assign(chosen, possible.reduce((best, one) => agrees(one) > agrees(best) ? one : best));
+    keys.forEach((other, k) => (choices[k].lastChild.value = chosen[other]));
     film = await hicpLoad(`${folder}/${chosen.file}`);
     film.steps ??= film.frames.map(({t}) => ({t}));
     [film.centre, film.half] = hicpAim(film);
@@ -95,10 +98,8 @@ hicpExplorers.films = (place, data, folder) => {
   };
   const choices = keys.map(key => {
     const values = [...new Set(data.films.map(one => one[key]))];
-    return hicpSelect(key[0].toUpperCase() + key.slice(1), values.map(value => [value, value]), chosen[key], value => {
-      chosen[key] = value;
-      open();
-    });
+    const title = key[0].toUpperCase() + key.slice(1);
+    return hicpSelect(title, values.map(value => [value, value]), chosen[key], value => open(key, value));
   });
   const time = hicpSlider("Time", 1, 0, k => film ? `${film.steps[k].t.toFixed(1)} s` : "", k => {
     stop();

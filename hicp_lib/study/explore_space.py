@@ -48,9 +48,12 @@ def runs(chosen: Iterable[Run]) -> Explored:
     """
     films: list[dict[str, Any]] = []
     files: dict[str, bytes] = {}
+    people: dict[str, dict[int, int]] = {}
     for run in (run for run in chosen if len(run.frames)):
         name, trial = f"film-{len(films)}", run.job.trial
-        films.append({"script": trial.script, "person": trial.subject.number, "detector": run.job.condition})
+        numbers = people.setdefault(trial.script, {})
+        person = numbers.setdefault(trial.subject.number, len(numbers) + 1)
+        films.append({"script": trial.script, "person": person, "detector": run.job.condition})
         frames = [frame for _, frame in run.frames.iterrows()]
         every = max(1, round(_STEP_S / run.cycles["t_s"].diff().median()))
         steps = [_step(cycle) for _, cycle in run.cycles.iloc[::every].iterrows()]

@@ -199,7 +199,9 @@ def opened(tmp_path, monkeypatch, browser):
         head += '<link rel="stylesheet" href="../_static/explore.css">'
         page = tmp_path / "notebooks" / "07_x.html"
         page.write_text(
-            f"<!doctype html><html lang=en><title>x</title>{head}<body>{''.join(shown)}", encoding="utf-8"
+            "<!doctype html><html lang=en><meta charset=utf-8><title>x</title>"
+            f"{head}<div class=cell>{''.join(shown)}</div>",
+            encoding="utf-8",
         )
         browser.get_log("browser")
         browser.get(page.as_uri())
@@ -218,7 +220,7 @@ def open_explorer(browser) -> None:
     """By the keyboard, as everything else."""
     (summary,) = find(browser, ".hicp-explorer summary")
     summary.send_keys(Keys.ENTER)
-    wait(browser, "return document.querySelector('.hicp-picture svg') !== null")
+    wait(browser, "return document.querySelector('svg[role=img]') !== null")
 
 
 def wait(browser, condition: str, limit_s: int = 20) -> None:
