@@ -123,6 +123,11 @@ function hicpLegend(styles, heads, change) {
   return {element, fill, isShown: ({name}) => !hidden.has(name)};
 }
 
+/** The numbers of a detector and group, of rows that begin with these two; none where there is no such row. */
+function hicpNumbers(rows, detector, group) {
+  return rows.find(row => row[0] === detector && row[1] === group)?.slice(2) ?? [];
+}
+
 /** What of a picture is shown: the truth below, then detectors' people. */
 function hicpLayers(view, data, legend, minScore) {
   const unit = Math.hypot(...view.size) / 230, shown = data.detectors.filter(legend.isShown);

@@ -12,8 +12,8 @@ hicpExplorers.crops = (place, data, folder) => {
     picture.replaceChildren(
       hicpPicture(`${folder}/${view.file}`, view.size, alt, hicpLayers(view, data, legend, minScore)));
     for (const {name} of data.detectors) {
-      const {body, hand} = view.oks[name] ?? {};
-      legend.fill(name, [body?.[0]?.toFixed(2), hand?.[0]?.toFixed(2), view.found[name]?.length]);
+      const oks = group => hicpNumbers(view.oks, name, group)[0]?.toFixed(2);
+      legend.fill(name, [oks("body"), oks("hand"), view.found[name]?.length]);
     }
     words.textContent = `Crop ${id} of ${subset}.`;
   };
@@ -22,10 +22,7 @@ hicpExplorers.crops = (place, data, folder) => {
     slider.set(at);
     draw();
   };
-  const fit = person => {
-    const oks = person.views[subset].oks[order] ?? {};
-    return (oks.body ?? oks.hand)?.[0] ?? 2;
-  };
+  const fit = ({views}) => ["body", "hand"].flatMap(group => hicpNumbers(views[subset].oks, order, group))[0] ?? 2;
   const choose = () => {  // whom to go through, from the same person on if possible
     const shown = people?.[at];
     people = data.people.filter(({views}) => views[subset]);

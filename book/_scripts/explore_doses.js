@@ -10,10 +10,11 @@ hicpExplorers.doses = (place, data, folder) => {
     const alt = `Person ${person + 1} at ${level}, with what is detected`;
     picture.replaceChildren(
       hicpPicture(`${folder}/${view.file}`, view.size, alt, hicpLayers(view, data, legend, minScore)));
-    const said = ([value, ...ends]) => value.toFixed(2) + (ends.includes(null) ? "" : ` [${ends.map(x => x.toFixed(2)).join(", ")}]`);
+    const said = ([value, ...ends]) => value === undefined ? undefined
+      : value.toFixed(2) + (ends.includes(null) ? "" : ` [${ends.map(end => end.toFixed(2)).join(", ")}]`);
     for (const {name} of data.detectors) {
-      const {body, hand} = dose.ap[at][name] ?? {};
-      legend.fill(name, [body && said(body), hand && said(hand), view.found[name]?.length]);
+      const ap = group => said(hicpNumbers(dose.ap[at], name, group));
+      legend.fill(name, [ap("body"), ap("hand"), view.found[name]?.length]);
     }
     words.textContent = `Person ${person + 1} at ${level}.`;
   };

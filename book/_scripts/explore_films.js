@@ -38,21 +38,20 @@ function hicpRobot({robot, taxels}, radii, view) {
 }
 
 hicpExplorers.films = (place, data, folder) => {
-  const [width, height] = data.size, keys = Object.keys(data.films[0]).filter(key => !["file", "sheet"].includes(key));
+  const keys = Object.keys(data.films[0]).filter(key => !["file", "sheet"].includes(key));
   const chosen = {...data.films[0]}, words = hicpMake("p", {"aria-live": "off"});
   const camera = hicpMake("div"), space = hicpMake("div");
   let [film, at, turn_deg, timer] = [null, 0, 30, null];
 
-  const frameAt = t => film.frames.findLastIndex(frame => frame.t <= t + 1e-6);
+  const frameAt = t_s => film.frames.findLastIndex(frame => frame.t_s <= t_s + 1e-6);
   const draw = () => {
-    const step = film.steps[at], k = frameAt(step.t), frame = film.frames[k];
+    const step = film.steps[at], k = frameAt(step.t_s), frame = film.frames[k];
     const style = data.detectors.find(({name}) => name === chosen.detector);
     const colours = {...HICP_BODIES, perceived: style.colour}, view = hicpView(turn_deg, film.centre);
     const [column, row] = [Math.max(k, 0) % data.columns, Math.floor(Math.max(k, 0) / data.columns)];
-    const sheet = hicpMake("svg:image", {
-      href: `${folder}/${chosen.sheet}`, x: -column * width, y: -row * height, width: data.columns * width,
-      height: Math.ceil(film.frames.length / data.columns) * height,
-    });
+    const {sheet: {src, naturalWidth, naturalHeight}, width, height} = film;
+    const all = {href: src, x: -column * width, y: -row * height, width: naturalWidth, height: naturalHeight};
+    const sheet = hicpMake("svg:image", all);
     const alt = `The camera's picture ${k + 1} with what ${chosen.detector} finds`;
     camera.replaceChildren(hicpMake("svg:svg", {viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": alt},
       ...(frame ? [sheet, hicpPeople(frame.found, data.limbs, style, 0.3, 1.2)] : [])));
@@ -62,8 +61,8 @@ hicpExplorers.films = (place, data, folder) => {
     const box = [-1, -0.75, 2, 1.5].map(share => share * film.half).join(" ");
     space.replaceChildren(hicpMake("svg:svg", {viewBox: box, role: "img", "aria-label": "The same in space"},
       ...hicpScale(film.half), ...(step.robot ? hicpRobot(step, data.radii, view) : []), ...drawn));
-    const told = step.robot ? `: nearest ${(100 * step.distance).toFixed(1)} cm, activation ${step.activation.toFixed(2)}` : "";
-    words.textContent = `${step.t.toFixed(1)} s${told}.`;
+    const told = step.robot ? `: nearest ${(100 * step.distance_m).toFixed(1)} cm, activation ${step.activation.toFixed(2)}` : "";
+    words.textContent = `${step.t_s.toFixed(1)} s${told}.`;
     time.set(at);
   };
   const stop = () => {
@@ -74,7 +73,7 @@ hicpExplorers.films = (place, data, folder) => {
   const next = () => {
     at = (at + 1) % film.steps.length;
     draw();
-    const wait_s = at + 1 < film.steps.length ? film.steps[at + 1].t - film.steps[at].t : 1;
+    const wait_s = at + 1 < film.steps.length ? film.steps[at + 1].t_s - film.steps[at].t_s : 1;
     const slow = matchMedia("(prefers-reduced-motion: reduce)").matches ? 1 : wait_s;
     timer = place.closest("details").open ? setTimeout(next, 1000 * slow) : stop();
   };
@@ -90,7 +89,11 @@ hicpExplorers.films = (place, data, folder) => {
     Object.assign(chosen, possible.reduce((best, one) => agrees(one) > agrees(best) ? one : best));
     keys.forEach((other, k) => (choices[k].lastChild.value = chosen[other]));
     film = await hicpLoad(`${folder}/${chosen.file}`);
-    film.steps ??= film.frames.map(({t}) => ({t}));
+    film.steps ??= film.frames.map(({t_s}) => ({t_s}));
+    film.sheet = hicpMake("img", {src: `${folder}/${chosen.sheet}`});
+    await film.sheet.decode();
+    film.width = film.sheet.naturalWidth / data.columns;
+    film.height = film.sheet.naturalHeight / Math.ceil(film.frames.length / data.columns);
     [film.centre, film.half] = hicpAim(film);
     at = Math.min(at, film.steps.length - 1);
     time.input.max = film.steps.length - 1;
@@ -101,7 +104,7 @@ hicpExplorers.films = (place, data, folder) => {
     const title = key[0].toUpperCase() + key.slice(1);
     return hicpSelect(title, values.map(value => [value, value]), chosen[key], value => open(key, value));
   });
-  const time = hicpSlider("Time", 1, 0, k => film ? `${film.steps[k].t.toFixed(1)} s` : "", k => {
+  const time = hicpSlider("Time", 1, 0, k => film ? `${film.steps[k].t_s.toFixed(1)} s` : "", k => {
     stop();
     at = k;
     draw();

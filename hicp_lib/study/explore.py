@@ -5,7 +5,7 @@ are flat lists: index, coordinates and score of one after the other.
 """
 
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -63,10 +63,9 @@ def crops(
                     here = {d: of[image_id] for (s, d), of in found.items() if s == subset and image_id in of}
                     file, rows = f"{subset}-{image_id}.webp", fits.get((subset, image_id), oks[:0])
                     shown, files[file] = _view(folders[subset] / "images", annotations, image_id, here)
-                    views[subset] = shown | {"file": file, "oks": _by_detector(rows, ["oks"])}
+                    views[subset] = shown | {"file": file, "oks": _rows(rows, "oks")}
             people.append({"id": image_id, "views": views})
-    names = dict.fromkeys(detector for _, detector in found)
-    return styles(names) | {"people": people, "subsets": list(truth)}, files
+    return styles(detector for _, detector in found) | {"people": people, "subsets": list(truth)}, files
 
 
 def doses(
@@ -103,7 +102,7 @@ def doses(
     ap = dict(iter(curves[curves["measure"] == "AP"].groupby(["dose", "level"])))
     told = [
         {"name": dose, "unit": _UNITS.get(dose, ""), "levels": list(levels), "views": list(levels.values())}
-        | {"ap": [_by_detector(ap[dose, level], ["value", "low", "high"]) for level in levels]}
+        | {"ap": [_rows(ap[dose, level], "value", "low", "high") for level in levels]}
         for dose, levels in taken.items()
     ]
     n = len({extra["source_image_id"] for extra in people.extras})
@@ -122,7 +121,8 @@ def styles(detectors: Iterable[str]) -> dict[str, Any]:
     dict of str to object
         `detectors` and `limbs`.
     """
-    shown = [{"name": d, "colour": detector_colour(d), "marker": detector_marker(d)} for d in detectors]
+    names = dict.fromkeys(detectors)
+    shown = [{"name": d, "colour": detector_colour(d), "marker": detector_marker(d)} for d in names]
     return {"detectors": shown, "limbs": LIMBS}
 
 
@@ -145,8 +145,7 @@ def spread(values: Iterable[int], n: int) -> list[int]:
     ([1, 3, 5], [])
     """
     ordered = sorted(values)
-    places = np.linspace(0, len(ordered) - 1, min(n, len(ordered))).round().astype(int)
-    return [ordered[k] for k in np.unique(places)]
+    return ordered[:: max(1, -(-len(ordered) // n))]
 
 
 def _view(
@@ -209,10 +208,7 @@ def flat(points: np.ndarray, scores: np.ndarray, digits: int = 1) -> list[list[f
     return people
 
 
-def _by_detector(rows: pd.DataFrame, columns: Sequence[str]) -> dict[str, dict[str, list[float | None]]]:
-    """Numbers of some columns by detector and group; None where there is none."""
-    nested: dict[str, dict[str, list[float | None]]] = {}
-    for (detector, group), row in rows.set_index(["detector", "group"])[columns].iterrows():
-        numbers = [None if pd.isna(number) else round(float(number), 3) for number in row]
-        nested.setdefault(detector, {})[group] = numbers
-    return nested
+def _rows(table: pd.DataFrame, *columns: str) -> list[list[Any]]:
+    """Rows of detector, group and numbers; None where there is none."""
+    chosen = table[["detector", "group", *columns]].round(3).astype(object)
+    return chosen.where(chosen.notna(), None).to_numpy().tolist()

@@ -13,8 +13,8 @@ import pandas as pd
 from PIL import Image
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.keypoints import BODY, HANDS, INDEX, N_KEYPOINTS
-from hicp_lib.evaluation.space.stability import POSITION
+from hicp_lib.core.keypoints import BODY, HANDS, N_KEYPOINTS, NAMES
+from hicp_lib.evaluation.space.stability import position_array
 from hicp_lib.experiments.avoidance.closed_loop import start_posture
 from hicp_lib.experiments.avoidance.runs import Run, image
 from hicp_lib.recordings.recording import Recording, read_rgb, read_truth
@@ -26,7 +26,7 @@ from hicp_lib.study.explore import Explored, flat, spread, styles, webp
 from hicp_lib.study.page import as_script
 
 _COLUMNS = 8  # of the sheet of a film's pictures
-_PICTURE_PX = (240, 180)
+_WIDTH_PX = 240
 TRUTH, _PERCEIVED = "truth", "perceived"
 _THREATENED = 0.05  # activation from which a taxel is drawn
 _STEP_S = 0.1
@@ -84,35 +84,34 @@ def lifted(
     dict of str to bytes
     """
     frames, truth = spread(range(len(recording)), n_frames), read_truth(recording)
-    known = [] if truth is None else [truth.assign(score=1.0, method=TRUTH, person=0)]
+    true = {} if truth is None else {TRUTH: truth}
     times_s = (recording.times_s - recording.times_s[0]).round(3).tolist()
     films: list[dict[str, Any]] = []
     files = {"sheet.webp": _sheet([read_rgb(recording, frame) for frame in frames])}
+    best = points[points["person"] == 0]
     for detector, seen in found.items():
-        rows = pd.concat([*known, points[points["detector"] == detector]])
-        placed = dict(iter(rows[rows["person"] == 0].groupby("frame")))
+        tables = dict(iter(best[best["detector"] == detector].groupby("method", sort=False))) | true
+        places_m = {name: position_array(rows, NAMES, len(recording)) for name, rows in tables.items()}
         told = [
-            {"t": times_s[frame], "found": _in_picture(seen[frame], recording.intrinsics.width_px)}
-            | {"bodies": _bodies(placed.get(frame, rows[:0]))}
+            {"t_s": times_s[frame], "found": _in_picture(seen[frame], recording.intrinsics.width_px)}
+            | {"bodies": {name: _body(of[frame]) for name, of in places_m.items()}}
             for frame in frames
         ]
         files[f"film-{len(films)}.js"] = as_script({"frames": told})
         films.append({"detector": detector, "sheet": "sheet.webp"})
-    return _films(films, list(points["method"].unique())), files
+    return _films(films, list(best["method"].unique())), files
 
 
 def _films(films: list[dict[str, Any]], bodies: Sequence[str]) -> dict[str, Any]:
     listed = [{"file": f"film-{k}.js", "sheet": f"film-{k}.webp"} | film for k, film in enumerate(films)]
-    detectors = dict.fromkeys(film["detector"] for film in films)
-    return styles(detectors) | {"films": listed, "bodies": bodies, "size": _PICTURE_PX, "columns": _COLUMNS}
+    shown = {"films": listed, "bodies": bodies, "columns": _COLUMNS}
+    return styles(film["detector"] for film in films) | shown
 
 
 def _seen(frame: pd.Series) -> dict[str, Any]:
     (rgb, found), (points_m, is_sure, truth_m) = image(frame), sure_keypoints(frame)
-    true = flat(1000 * truth_m[None], _FACELESS[None], 0)
-    perceived = flat(1000 * points_m, is_sure.astype(float), 0)
-    shown = {"found": _in_picture(found, rgb.shape[1]), "bodies": {TRUTH: true, _PERCEIVED: perceived}}
-    return {"t": round(frame["t_s"], 3)} | shown
+    bodies = {TRUTH: _body(truth_m), _PERCEIVED: flat(1000 * points_m, is_sure.astype(float), 0)}
+    return {"t_s": round(frame["t_s"], 3), "found": _in_picture(found, rgb.shape[1]), "bodies": bodies}
 
 
 def _step(cycle: pd.Series) -> dict[str, Any]:
@@ -121,30 +120,24 @@ def _step(cycle: pd.Series) -> dict[str, Any]:
     activations = np.asarray(cycle["activations"])[None]
     threats = np.where(activations > _THREATENED, activations, 0)
     taxels = flat(1000 * read_skin().in_root(load_icub(), posture)[0][None], threats, 0)
-    told = {"t": cycle["t_s"], "distance": cycle["distance_m"], "activation": cycle["activation"]}
-    shown = {"robot": (1000 * ends_m).round().astype(int).reshape(-1, 6), "taxels": taxels}
-    return {name: round(number, 3) for name, number in told.items()} | shown
+    told = cycle[["t_s", "distance_m", "activation"]].astype(float).round(3).to_dict()
+    return told | {"robot": (1000 * ends_m).round().astype(int).reshape(-1, 6), "taxels": taxels}
 
 
-def _bodies(rows: pd.DataFrame) -> dict[str, list[list[float]]]:
-    """Keypoints in space by method, of the rows of one person in one frame."""
-    bodies = {}
-    for method, of in rows.groupby("method"):
-        places_m = np.full((N_KEYPOINTS, 3), np.nan)
-        places_m[of["keypoint"].map(INDEX)] = of[POSITION]
-        bodies[method] = flat(1000 * places_m[None], _FACELESS[None], 0)
-    return bodies
+def _body(places_m: np.ndarray) -> list[list[float]]:
+    return flat(1000 * places_m[None], _FACELESS[None], 0)
 
 
 def _in_picture(found: Detections, width_px: int) -> list[list[float]]:
-    return flat((found.keypoints_px + 0.5) * _PICTURE_PX[0] / width_px, found.scores)
+    return flat((found.keypoints_px + 0.5) * _WIDTH_PX / width_px, found.scores)
 
 
 def _sheet(pictures: Sequence[np.ndarray]) -> bytes:
     """Pictures made small, in rows of `_COLUMNS`."""
-    width_px, height_px = _PICTURE_PX
-    sheet = Image.new("RGB", (_COLUMNS * width_px, -(-len(pictures) // _COLUMNS) * height_px))
+    height_px, width_px = pictures[0].shape[:2]
+    size = _WIDTH_PX, round(height_px / width_px * _WIDTH_PX)
+    sheet = Image.new("RGB", (_COLUMNS * size[0], -(-len(pictures) // _COLUMNS) * size[1]))
     for k, picture in enumerate(pictures):
-        small = Image.fromarray(picture).resize(_PICTURE_PX, Image.Resampling.LANCZOS)
-        sheet.paste(small, (k % _COLUMNS * width_px, k // _COLUMNS * height_px))
+        small = Image.fromarray(picture).resize(size, Image.Resampling.LANCZOS)
+        sheet.paste(small, (k % _COLUMNS * size[0], k // _COLUMNS * size[1]))
     return webp(sheet)
