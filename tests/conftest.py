@@ -26,7 +26,9 @@ BROWSER_FLAGS = (
 
 
 # What needs the book.
-OF_THE_BOOK = {"test_api_pages.py", "test_jupyterlab.py", "test_links.py", "test_notebooks.py"}
+OF_THE_BOOK = {
+    "test_api_pages.py", "test_explored_pages.py", "test_jupyterlab.py", "test_links.py", "test_notebooks.py",
+}  # fmt: skip
 
 
 # What takes long, as measured; a file, or one test of it.

@@ -126,7 +126,7 @@ def _assemble(source: Path, folders: Folders, left_out: Mapping[str, str]) -> No
     for name, reason in left_out.items():
         _write_stub(folders.sources / "notebooks" / f"{name}.ipynb", notebooks / f"{name}.ipynb", reason)
     scripts = source / SCRIPTS_DIR
-    scripts.mkdir()
+    scripts.mkdir(exist_ok=True)
     for package, path, name in _SCRIPTS:
         shutil.copy(str(importlib.resources.files(package) / path), scripts / name)
 

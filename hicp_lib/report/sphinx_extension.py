@@ -1,10 +1,12 @@
 """The book's Sphinx extension: pages load what they use, and nothing that would ask a network."""
 
+import re
 from typing import Any
 
 # Not in `_static`: Jupyter Book loads every script it finds there on every page.
 SCRIPTS_DIR = "_scripts"
 PLOTLY_PATH = "plotly.js"
+_EXPLORER = re.compile(r'data-explorer="(\w+)"')
 
 
 def setup(app: Any) -> dict[str, bool]:
@@ -22,7 +24,9 @@ def _prepare(app: Any, config: Any) -> None:
 
 
 def _choose_files(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
-    """Load Plotly where there is a 3D scene."""
+    """Load what draws a page's 3D scenes and what its readers explore."""
     context["css_files"][:] = [file for file in context["css_files"] if "thebe" not in str(file.filename)]
-    if "hicp-scene" in context.get("body", ""):
-        app.add_js_file(PLOTLY_PATH)
+    if explorers := sorted(set(_EXPLORER.findall(context.get("body", "")))):
+        app.add_css_file("explore.css")
+        for name in ("explore", *(f"explore_{explorer}" for explorer in explorers)):
+            app.add_js_file(f"{name}.js", loading_method="defer")

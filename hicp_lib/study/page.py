@@ -18,6 +18,7 @@ import json
 import math
 import os
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 
 SCHEMA_VERSION = 1
 PLOTLY_MIME = "application/vnd.plotly.v1+json"
+_PLOTLY_OPTIONS = {"displaylogo": False, "showSendToCloud": False, "responsive": True}
 _SVG_STYLE: dict[Any, Any] = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
 _SAVE_OPTIONS: dict[str, dict[str, Any]] = {"png": {}, "svg": {"metadata": {"Date": None}}}
 _SAVE_OPTIONS |= {"webp": {"pil_kwargs": {"quality": 88, "method": 4}}}
@@ -110,21 +112,6 @@ class Study:
             downloads += ["svg", "parquet", "csv"]
         self._show_image(name, content, figure.alt, figure.caption, downloads)
 
-    def animation(self, name: str, film: bytes, caption: str, alt: str) -> None:
-        """Save a film and show it with the browser's controls; nothing moves before a reader starts it.
-
-        Parameters
-        ----------
-        name : str
-        film : bytes
-            Content of an MP4 file.
-        caption, alt : str
-        """
-        write_bytes(self.folder / f"{name}.mp4", film)
-        words, source = escaped(alt), _inline("video/mp4", film)
-        body = f'<video controls loop muted playsinline aria-label="{words}" src="{source}">{words}</video>'
-        self._show_figure(name, body, caption, ["mp4"], file=f"{name}.mp4", alt=alt)
-
     def scene(self, name: str, scene: go.Figure, caption: str, alt: str) -> None:
         """Save an interactive 3D scene (its data as JSON) and show it.
 
@@ -136,15 +123,42 @@ class Study:
         scene : plotly.graph_objects.Figure
         caption, alt : str
         """
-        data = scene.to_json()
-        write_bytes(self.folder / f"{name}.json", data.encode())
-        body = scene.to_html(full_html=False, include_plotlyjs=False, div_id=f"scene-{name}")
-        body = f'<div class="hicp-scene" role="img" aria-label="{escaped(alt)}">{body}</div>'
-        display({PLOTLY_MIME: json.loads(data), "text/html": body}, raw=True)
+        drawn = json.loads(scene.to_json()) | {"config": _PLOTLY_OPTIONS}
+        write_json(self.folder / f"{name}.json", drawn)
+        words, place = escaped(alt), self._for_explorer("scene", name, drawn)
+        place += f' style="min-height: {scene.layout.height or 450}px"'
+        body = f'<div class="hicp-scene" role="group" tabindex="0" aria-label="{words}" {place}>{words}</div>'
+        display({PLOTLY_MIME: drawn, "text/html": body}, raw=True)
         self._show_figure(name, "", caption, ["json"], alt=alt)
 
+    def explorer(self, name: str, title: str, data: Any, files: Mapping[str, bytes]) -> None:
+        """Save what a reader explores on the book's page, which reads it when it is opened there.
+
+        JupyterLab shows nothing: a figure beside it says the same of a part of the data.
+
+        Parameters
+        ----------
+        name : str
+            Of the explorer: `book/_scripts/explore_NAME.js` draws it.
+        title : str
+        data : any
+            Plain, and finite.
+        files : mapping of str to bytes
+            Pictures that it shows, by file name.
+        """
+        for file, content in files.items():
+            write_bytes(self.folder / name / file, content)
+        place = f'{self._for_explorer(name, name, data)} data-title="{escaped(title)}"'
+        display(HTML(f'<div class="hicp-explorer" {place}></div>'))
+
     def table(
-        self, name: str, table: pd.DataFrame, caption: str, digits: int = 3, shown: pd.DataFrame | None = None
+        self,
+        name: str,
+        table: pd.DataFrame,
+        caption: str,
+        digits: int = 3,
+        shown: pd.DataFrame | None = None,
+        explore: bool = False,
     ) -> None:
         """Save a table (Parquet, CSV) and show it; NaN is shown as a dash.
 
@@ -157,12 +171,15 @@ class Study:
             Decimals of its floats, as shown.
         shown : pd.DataFrame, optional
             What the page shows in its place: fewer columns, texts with intervals.
+        explore : bool, optional
+            Whether the book's readers can sort and filter its rows.
         """
         self._save_for_download(name, table)
         cells = (table if shown is None else shown).rename(columns=escaped).map(_cell)
         style = cells.style.hide(axis="index").format(precision=digits, na_rep="–").set_uuid(name)
         body = style.to_html(table_attributes='class="table"')
-        self._show_figure(name, f'<div class="hicp-table">{body}</div>', caption, ["parquet", "csv"])
+        place = ' data-explorer="table"' if explore else ""
+        self._show_figure(name, f'<div class="hicp-table"{place}>{body}</div>', caption, ["parquet", "csv"])
 
     def save(self, name: str, table: pd.DataFrame) -> None:
         """Save a table as Parquet without showing it; its parameters travel in the file's metadata."""
@@ -197,6 +214,11 @@ class Study:
         write_json(self.folder / "provenance.json", stamp, indent=2)
         display(HTML(provenance_html(stamp)))
 
+    def _for_explorer(self, kind: str, name: str, data: Any) -> str:
+        """Write data for a script of the book; the attributes that lead it there."""
+        write_bytes(self.folder / name / "data.js", as_script(data))
+        return f'data-explorer="{kind}" data-folder="{self._link}/{name}"'
+
     def _save_for_download(self, name: str, table: pd.DataFrame) -> None:
         self.save(name, table)
         write_bytes(self.folder / f"{name}.csv", table.to_csv(index=False).encode())
@@ -215,6 +237,26 @@ class Study:
         caption = f'{escaped(caption)} <span class="hicp-download">{links}</span>'
         whole = f"{body}<figcaption>{caption}</figcaption>"
         display(HTML(f'<figure class="hicp mathjax_ignore" id="{name}">{whole}</figure>'))
+
+
+def as_script(data: Any) -> bytes:
+    """Data as a script: a page that is read from disk may load that, but no JSON.
+
+    Parameters
+    ----------
+    data : any
+        Plain, and finite.
+
+    Returns
+    -------
+    bytes
+
+    Examples
+    --------
+    >>> as_script({"x_px": np.array([1, 2])})
+    b'hicpData({"x_px":[1,2]});\\n'
+    """
+    return f"hicpData({json.dumps(_plain(data), separators=(',', ':'))});\n".encode()
 
 
 def _cell(value: Any) -> Any:

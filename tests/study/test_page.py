@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -103,19 +102,6 @@ def test_the_stamp_says_what_was_run(study, shown, tmp_path):
     assert 20 < stamp["peak_memory_mb"] < 100_000
     assert "seed = 3" in shown[0]
     assert stamp["lock_sha256"][:12] in shown[0]
-
-
-def test_an_animation_is_saved_whole_and_shown_with_its_words(study, shown):
-    study.animation("moves", b"....ftypisom", "It <moves>.", 'An "arm"')
-    assert (study.folder / "moves.mp4").read_bytes() == b"....ftypisom"
-    assert 'src="data:video/mp4;base64,' in shown[0] and 'aria-label="An &#34;arm&#34;"' in shown[0]
-    assert "It &#60;moves&#62;." in shown[0] and 'href="../results/quick/07_x/moves.mp4"' in shown[0]
-
-
-def test_a_film_has_controls_and_waits_to_be_started(study, shown):
-    study.animation("moves", b"....ftypisom", "It moves.", "An arm")
-    (tag,) = re.findall("<video[^>]*>", shown[0])
-    assert " controls " in tag and "autoplay" not in tag
 
 
 def test_a_scene_is_described_and_carries_no_library_of_its_own(study, shown):

@@ -1,20 +1,14 @@
-"""Pictures of a run: what the camera sees beside what an onlooker sees, as a strip and as a film.
+"""Pictures of a run: what the camera sees, above what an onlooker sees.
 
 A taxel is the darker red and the larger the more it is threatened; those behind something shine through.
 """
 
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 
-import cv2
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from hicp_lib.core.camera import transform
-from hicp_lib.core.errors import InputError
 from hicp_lib.experiments.avoidance.closed_loop import start_posture
 from hicp_lib.experiments.avoidance.head_camera import CAMERA, onlooker_view, robot_surfaces
 from hicp_lib.experiments.avoidance.reaching import LEAVES_S, NEAR_S
@@ -31,7 +25,6 @@ from hicp_lib.study.plots.style import COLUMN_IN, Figure, in_style, new_figure, 
 
 _THREATENED = 0.05  # activation from which a taxel is drawn
 _MOST = 0.5  # activation of the darkest
-_VP9 = cv2.VideoWriter.fourcc(*"vp09")
 
 
 @in_style
@@ -76,51 +69,6 @@ def nearest_views(runs: Sequence[Run], note: str) -> Figure:
         titles=detectors,
         cell_in=COLUMN_IN / max(len(detectors), 2),
     )
-
-
-def animation(run: Run, rate_hz: float = 5.0, dpi: int = 60) -> bytes:
-    """The same as a film in real time.
-
-    Parameters
-    ----------
-    run : Run
-    rate_hz : float
-        Pictures per second.
-    dpi : int
-
-    Returns
-    -------
-    bytes
-        Of an MP4 file (VP9), which browsers play.
-
-    Raises
-    ------
-    InputError
-        If OpenCV was built without VP9.
-    """
-    first_s, last_s = run.cycles["t_s"].iloc[[0, -1]]
-    times_s = np.arange(first_s, last_s, 1 / rate_hz).tolist()
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        mpl.rc_context({"figure.constrained_layout.use": True, "font.size": 10}),
-    ):
-        figure, (camera, space) = new_figure(1, 2, 10.0, 4.0, width_ratios=[0.8, 1])
-        canvas, path = FigureCanvasAgg(figure), Path(folder, "film.mp4")
-        figure.set_dpi(dpi)
-        size_px = tuple(length // 2 * 2 for length in canvas.get_width_height())  # VP9 halves colours
-        film = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, _VP9, rate_hz, size_px)
-        if not film.isOpened():
-            raise InputError("this OpenCV writes no VP9 films; install opencv-python-headless of PyPI")
-        for time_s in times_s:
-            for drawn in [artist for axis in (camera, space) for artist in (*axis.images, *axis.collections)]:
-                drawn.remove()
-            _draw_moment(camera, space, run, time_s)
-            canvas.draw()
-            figure.set_layout_engine("none")  # all pictures are laid out like the first
-            rgb = np.asarray(canvas.buffer_rgba())[: size_px[1], : size_px[0], :3]
-            film.write(np.ascontiguousarray(rgb[..., ::-1]))
-        film.release()
-        return path.read_bytes()
 
 
 def _draw_moment(camera, space, run: Run, time_s: float) -> None:

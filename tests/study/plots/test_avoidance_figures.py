@@ -1,4 +1,4 @@
-"""Figures and the animation of avoidance are drawn from a short run, and say what they show."""
+"""Figures of avoidance are drawn from a short run, and say what they show."""
 
 import cv2
 import numpy as np
@@ -12,7 +12,7 @@ from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.separation import Separation
 from hicp_lib.robot.skin import read_skin
 from hicp_lib.study.plots.avoidance import clearances, separation_terms, sweep_curves
-from hicp_lib.study.plots.avoidance_pictures import animation, filmstrip, nearest_views
+from hicp_lib.study.plots.avoidance_pictures import filmstrip, nearest_views
 
 
 @pytest.fixture(scope="module")
@@ -55,15 +55,10 @@ def test_clearances_and_sweeps_are_drawn_over_people():
     assert figure.figure.axes[0].get_lines()[0].get_xdata().tolist() == [0, 300]
 
 
-def test_pictures_stand_still_and_move(run, tmp_path):
-    assert filmstrip(run, (0.1, 0.6), "made up").table is None
-    content = animation(run, rate_hz=4.0)
-    (tmp_path / "film.mp4").write_bytes(content)
-    film = cv2.VideoCapture(str(tmp_path / "film.mp4"))
-    assert film.get(cv2.CAP_PROP_FRAME_COUNT) == 4 and film.get(cv2.CAP_PROP_FPS) == pytest.approx(4.0)
-    first, *_, last = [film.read()[1].astype(float) for _ in range(4)]
-    assert np.abs(last - first).max() > 100  # the arm moved
-    assert content == animation(run, rate_hz=4.0)
+def test_a_strip_shows_the_arm_move(run):
+    strip = filmstrip(run, (0.1, 0.6), "made up")
+    first, last = (axis.images[0].get_array().astype(float) for axis in strip.figure.axes[2:])
+    assert strip.table is None and np.abs(last - first).max() > 100
 
 
 def test_each_detector_shows_the_last_image_before_the_middle_of_the_near_phase(run):
