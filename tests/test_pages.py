@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import importlib.resources
-import json
 from pathlib import Path
 
 import pytest
-from bs4 import BeautifulSoup
 
 LIGHT_AND_DARK, WIDTHS_PX = ("light", "dark"), (1280, 390)
 MOST_BYTES = 1_200_000
