@@ -19,6 +19,7 @@ from hicp_lib.core.datafiles import REFERENCE_DIR
 from hicp_lib.core.escape import escaped
 from hicp_lib.core.files import read_json, sha256_file, write_json
 from hicp_lib.report.checks import book_problems
+from hicp_lib.report.pages import finish_page
 from hicp_lib.report.prose import Results, render_page
 from hicp_lib.report.run import Folders, RunError
 from hicp_lib.report.runs import outputs, read_stamp
@@ -30,11 +31,6 @@ _SPHINX = "from hicp_lib.core.children import end_with; end_with(0); "
 _SPHINX += "from jupyter_book.cli.main import main; main()"
 # Links lead to files of the checkout. In the book, `book/` is the top and `notebooks/` lies in it.
 _LINK_TO_PAGE, _LINK_TO_NOTEBOOK = ("](../book/", "](../"), ("](../notebooks/", "](notebooks/")
-# MathJax in one file with its fonts inside: browsers refuse font files to pages that are read from disk.
-_SCRIPTS = (
-    ("sphinx-mathjax-offline", "static/mathjax/tex-svg.js", "mathjax.js"),
-    ("plotly", "package_data/plotly.min.js", PLOTLY_PATH),
-)
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -77,7 +73,7 @@ def build_book(folders: Folders, left_out: Mapping[str, str] | None = None) -> t
         _assemble(staging / "source", folders, left_out)
         built = _run_sphinx(staging, book.parent / f"{folders.profile}.log")
         shutil.copytree(folders.results, built / "results" / folders.profile)
-        if problems := book_problems(built):
+        if problems := book_problems(built, lambda page, path: finish_page(page, path, built)):
             raise RunError(f"book: {problems[0]} ({len(problems)} such problems in all)")
         if _key(folders, left_out) != key:
             raise RunError("book: what it is made of was changed while it was built; run the report again")
@@ -127,8 +123,8 @@ def _assemble(source: Path, folders: Folders, left_out: Mapping[str, str]) -> No
         _write_stub(folders.sources / "notebooks" / f"{name}.ipynb", notebooks / f"{name}.ipynb", reason)
     scripts = source / SCRIPTS_DIR
     scripts.mkdir(exist_ok=True)
-    for package, path, name in _SCRIPTS:
-        shutil.copy(str(importlib.resources.files(package) / path), scripts / name)
+    plotly = importlib.resources.files("plotly") / "package_data" / "plotly.min.js"
+    shutil.copy(str(plotly), scripts / PLOTLY_PATH)
 
 
 def _with_data_note(executed: Path, results: Results) -> str:

@@ -1,7 +1,7 @@
 """What a built book promises: nothing loads from a network, every image has words."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from bs4 import BeautifulSoup
@@ -17,8 +17,8 @@ _LOADS = r"(import|importScripts|fetch|\.src\s*=|\.href\s*=)"
 _LOADING_IN_SCRIPT = re.compile(_LOADS + r"\s*\(?\s*['\"`](https?:)?//")
 
 
-def _page_problems(page: str) -> Iterator[str]:
-    for tag in BeautifulSoup(page, "html.parser").find_all(True):
+def _page_problems(page: BeautifulSoup) -> Iterator[str]:
+    for tag in page.find_all(True):
         given = {name: str(value) for name, value in tag.attrs.items()}
         if tag.name == "img" and _says_nothing(given.get("alt", "")):
             yield f"image without alt text: {given.get('src', '')[:60]}"
@@ -43,13 +43,15 @@ def _says_nothing(alt: str) -> bool:
     return not alt.strip() or alt.lower().endswith((".png", ".svg", ".jpg", ".jpeg", ".gif", ".webp"))
 
 
-def book_problems(folder: Path) -> list[str]:
+def book_problems(folder: Path, finish: Callable[[BeautifulSoup, Path], None] | None = None) -> list[str]:
     """What in a built book needs a network or lacks words, one line each; empty when it is sound.
 
     Parameters
     ----------
     folder : Path
         Of the built pages; all HTML and CSS files in it are read.
+    finish : callable, optional
+        Changes a page before it is judged; takes what was read of it, and its path.
 
     Examples
     --------
@@ -61,8 +63,11 @@ def book_problems(folder: Path) -> list[str]:
     """
     problems = []
     for path in sorted(folder.rglob("*.html")):
-        found = _page_problems(path.read_text(errors="replace"))
-        problems += [f"{path.relative_to(folder)}: {problem}" for problem in found]
+        page = BeautifulSoup(path.read_text(errors="replace"), "html.parser")
+        if finish is not None:
+            finish(page, path)
+            path.write_text(str(page))
+        problems += [f"{path.relative_to(folder)}: {problem}" for problem in _page_problems(page)]
     for path in sorted(folder.rglob("*.css")):
         if _REMOTE_IN_CSS.search(path.read_text(errors="replace")):
             problems.append(f"{path.relative_to(folder)}: loads from the network")

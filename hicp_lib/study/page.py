@@ -36,6 +36,7 @@ with needs("report"):
     import pyarrow as pa
     import pyarrow.parquet as pq
     from IPython.display import HTML, display
+    from pandas.io.formats.style import Styler
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -46,8 +47,9 @@ SCHEMA_VERSION = 1
 PLOTLY_MIME = "application/vnd.plotly.v1+json"
 _PLOTLY_OPTIONS = {"displaylogo": False, "showSendToCloud": False, "responsive": True}
 _SVG_STYLE: dict[Any, Any] = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
-_SAVE_OPTIONS: dict[str, dict[str, Any]] = {"png": {}, "svg": {"metadata": {"Date": None}}}
-_SAVE_OPTIONS |= {"webp": {"pil_kwargs": {"quality": 88, "method": 4}}}
+_SVG_OPTIONS: dict[str, Any] = {"format": "svg", "metadata": {"Date": None}}
+_DRAWING_OPTIONS: dict[str, Any] = {"format": "webp", "pil_kwargs": {"lossless": True, "method": 4}}
+_PICTURE_OPTIONS: dict[str, Any] = {"format": "webp", "pil_kwargs": {"quality": 80, "method": 4}}
 
 
 class Study:
@@ -99,18 +101,18 @@ class Study:
     def figure(self, name: str, figure: Figure) -> None:
         """Save a figure and show it with its caption, alt text and downloads.
 
-        A drawing is saved as PNG and SVG with its numbers, a picture (without any) as WebP.
+        A drawing is saved as WebP without loss and as SVG with its numbers, a picture (without any) as WebP.
         """
-        kind = "webp" if figure.table is None else "png"
-        content = _rendered(figure.figure, kind)
-        write_bytes(self.folder / f"{name}.{kind}", content)
-        downloads = [kind]
+        file, downloads = f"{name}.webp", ["webp"]
+        content = _rendered(figure.figure, _PICTURE_OPTIONS if figure.table is None else _DRAWING_OPTIONS)
+        write_bytes(self.folder / file, content)
         if figure.table is not None:
-            figure.figure.set_layout_engine("none")  # what was found for the PNG holds for the SVG
-            write_bytes(self.folder / f"{name}.svg", _rendered(figure.figure, "svg"))
+            figure.figure.set_layout_engine("none")  # what was found for the WebP holds for the SVG
+            write_bytes(self.folder / f"{name}.svg", _rendered(figure.figure, _SVG_OPTIONS))
             self._save_for_download(name, figure.table)
             downloads += ["svg", "parquet", "csv"]
-        self._show_image(name, content, figure.alt, figure.caption, downloads)
+        image = f'<img src="{_inline("image/webp", content)}" alt="{escaped(figure.alt)}">'
+        self._show_figure(name, image, figure.caption, downloads, file=file, alt=figure.alt)
 
     def scene(self, name: str, scene: go.Figure, caption: str, alt: str) -> None:
         """Save an interactive 3D scene (its data as JSON) and show it.
@@ -176,7 +178,8 @@ class Study:
         """
         self._save_for_download(name, table)
         cells = (table if shown is None else shown).rename(columns=escaped).map(_cell)
-        style = cells.style.hide(axis="index").format(precision=digits, na_rep="–").set_uuid(name)
+        style = Styler(cells, uuid=name, cell_ids=False).hide(axis="index")
+        style.format(lambda value: f"{value:z.{digits}f}" if isinstance(value, float) else value, na_rep="–")
         body = style.to_html(table_attributes='class="table"')
         place = ' data-explorer="table"' if explore else ""
         self._show_figure(name, f'<div class="hicp-table"{place}>{body}</div>', caption, ["parquet", "csv"])
@@ -223,13 +226,6 @@ class Study:
         self.save(name, table)
         write_bytes(self.folder / f"{name}.csv", table.to_csv(index=False).encode())
 
-    def _show_image(self, name: str, content: bytes, alt: str, caption: str, downloads: list[str]) -> None:
-        """Show the first of the downloads, an image."""
-        kind = downloads[0]
-        source = _inline(f"image/{kind}", content)
-        image = f'<img src="{source}" alt="{escaped(alt)}">'
-        self._show_figure(name, image, caption, downloads, file=f"{name}.{kind}", alt=alt)
-
     def _show_figure(self, name: str, body: str, caption: str, downloads: list[str], **said: str) -> None:
         self._captions[name] = said | {"caption": caption}
         link = f'<a href="{self._link}/{name}.{{}}" download>{{}}</a>'
@@ -269,11 +265,11 @@ def _inline(kind: str, content: bytes) -> str:
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
-def _rendered(figure, kind: str) -> bytes:
+def _rendered(figure, options: dict[str, Any]) -> bytes:
     """The same bytes for the same figure: no date, fixed identifiers."""
     buffer = io.BytesIO()
     with mpl.rc_context(_SVG_STYLE):
-        figure.savefig(buffer, format=kind, **_SAVE_OPTIONS[kind])
+        figure.savefig(buffer, **options)
     return buffer.getvalue()
 
 

@@ -47,7 +47,7 @@ def test_a_figure_is_shown_with_its_words_and_saved_the_same_each_time(study, sh
     assert 'alt="Says &#34;up&#34;"' in shown[0]
     assert "<figcaption>A &#60;caption&#62;" in shown[0]
     assert 'href="../results/quick/07_x/line.csv"' in shown[0]
-    first = {kind: (study.folder / f"line.{kind}").read_bytes() for kind in ("svg", "png", "csv")}
+    first = {kind: (study.folder / f"line.{kind}").read_bytes() for kind in ("svg", "webp", "csv")}
     study.figure("line", line_figure())
     assert first == {kind: (study.folder / f"line.{kind}").read_bytes() for kind in first}
 
