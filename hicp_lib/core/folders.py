@@ -113,7 +113,7 @@ def locked_folder(folder: str | Path) -> Iterator[None]:
             except BlockingIOError:
                 raise InputError(f"{folder}: another command writes there; wait for it to end") from None
             except OSError:
-                pass  # of a file system without locks
+                pass  # the file system has no locks
         for left in folder.rglob(f".partial-{'[0-9a-f]' * 16}*"):
             with suppress(OSError):
                 if time.time() - left.stat().st_mtime > _OLD_S:
