@@ -1,9 +1,10 @@
-"""Make data/icub_shape.npz: what an iCub looks like, as triangles fixed to the links of data/icub.json.
+"""Make data/icub_shape.npz: the appearance of an iCub, as triangles fixed to the links of data/icub.json.
 
     python tools/bake_robot.py [--out data]
 
-The shapes are this project's own: tubes of rounded sections, drawn around an upright robot whose arms hang,
-so that covers lie just under the taxels of data/icub_skin.json. The same versions write the same bytes.
+The shapes are this project's own: tubes with rounded cross-sections, modelled around an upright robot with
+hanging arms, so that covers lie just below the taxels of data/icub_skin.json. The same versions write the
+same bytes.
 """
 
 from __future__ import annotations

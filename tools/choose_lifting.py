@@ -1,12 +1,12 @@
-"""Choose the costs of the robust lifting on people for development, one at a time.
+"""Choose the costs of the robust lifting on development identities, one at a time.
 
     python tools/choose_lifting.py FOLDER [--constants NAME ...] [--factors 0.5 0.7 1.4 2]
 
-Renders every body for development in the setups of the study's 3D pages, as the D435 sees them, detects
-people (once; kept in FOLDER), and lifts what was found with each constant in turn times each factor. The
-rule: the 95th percentile of the errors of wrists, elbows and fingers (its geometric mean over the three)
-comes first, medians second. Another value is better where it is so by 3 % or more, and the interval of the
-difference, over draws of people, excludes 0. Nobody held out and no other sensor has a part in it.
+Renders every development body in the setups of the study's 3D pages with the D435's model, detects people
+(once; cached in FOLDER), and lifts the detections with each constant in turn multiplied by each factor. The
+first criterion is the 95th percentile of the errors of wrists, elbows and fingers (geometric mean over the
+three), the second their medians. Another value is better if it improves this by 3 % or more, and the interval
+of the difference, over resamples of people, excludes 0. No held-out identity and no other sensor is used.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Compare the results of two reports to the last bit, measured times apart.
+"""Compare the results of two reports to the last bit, except measured times.
 
     python tools/compare_reports.py ONE/results/full OTHER/results/full
 
-Prints a line per file that differs and what differs in it, and ends with 1 if there is any. What is
-measured of the machine is left out, and only that (`is_measured` of `hicp_lib/report/repetition.py`, and
+Prints a line per file that differs, with the differences, and exits with 1 if there is any. Only measurements
+of the machine are left out (`is_measured` of `hicp_lib/report/repetition.py`, and
 `MEASURED`): a page saves it under the name `time`, and values of it end in `_time_ms`.
 """
 

@@ -2,11 +2,11 @@
 
     python tools/draw_relative_poses.py
 
-Torso and neck are drawn evenly within the ranges below, which lie within the software limits of the
-robot; a pose is kept if the camera has before it what the view asks of anybody in the chair, whoever it
-is: arms and hands are not looked at, and may leave the image. The poses are then put in pairs, each followed
-by the one left whose camera is nearest, so that the few that one person is seen from hold nearly equal
-ones. Run once: results refer to the file as it is.
+Torso and neck are sampled uniformly within the ranges below, which are within the robot's software limits. A
+pose is kept if the camera sees what the view requires of any person in the chair; arms and hands are not
+considered, and may leave the image. The poses are then paired, each followed by the remaining one with the
+nearest camera, so that the few poses of one person include nearly equal ones. Run once: results refer to the
+file as it is.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
     python tools/export_detectron2.py configs/COCO-Keypoints/keypoint_rcnn_R_50_FPN_3x.yaml model.pkl out.onnx
 
-runs where PyTorch and Detectron2 are (its compiled extension is not needed) and uses nothing of this project.
-The maps are left undecoded: Detectron2's own last step, a loop over people, does not survive tracing.
-Operator set 16 or later is a must: before it ROIAlign knows no half pixel.
+runs in an environment with PyTorch and Detectron2 (its compiled extension is not needed) and uses nothing of
+this project. The maps are not decoded: Detectron2's own last step, a loop over people, cannot be traced.
+Operator set 16 or later is required: before, ROIAlign has no half-pixel mode.
 """
 
 import argparse

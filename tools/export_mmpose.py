@@ -1,4 +1,4 @@
-"""Make an ONNX file of a top-down network of MMPose: any number of crops, of the size it was trained on.
+"""Make an ONNX file of a top-down network of MMPose, for any number of crops of its training size.
 
     PYTHONPATH=. python .../tools/export_mmpose.py configs/.../NAME.py NAME.pth NAME.onnx
 

@@ -2,8 +2,8 @@
 
     python tools/export_openpose.py pose_deploy.prototxt pose_iter_584000.caffemodel body_25.onnx
 
-needs the package onnx. Bodies (COCO, BODY_25) and hands; height and width stay open, the weights lie in the
-file.
+needs the package onnx. Bodies (COCO, BODY_25) and hands; height and width are dynamic, and the weights are
+inside the file.
 """
 
 from __future__ import annotations

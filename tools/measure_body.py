@@ -1,11 +1,10 @@
-"""Measure the body model: how deep keypoints lie below the skin, and how far apart they can be.
+"""Measure the body model: depths of keypoints below the skin, and distances between them.
 
     python tools/measure_body.py [--out data/body_measures.npz]
 
-What lifting beyond the paper knows of people: of the bodies for development alone, none that is held out.
-Distances are the least and the most over them in random poses of every kind; the depth below the skin is the
-median over directions from the front, in the reference stance. Seeds are fixed: the same body model gives the
-same numbers.
+The body measures of the robust lifting, from development bodies only. Distances are the minimum and maximum
+over them in random poses of every kind; the depth below the skin is the median over directions from the
+front, in the reference stance. Seeds are fixed: the same body model gives the same numbers.
 """
 
 from __future__ import annotations

@@ -1,11 +1,10 @@
-"""Take shapes of hands from the body model, fingers bent at random.
+"""Sample shapes of hands from the body model, with randomly bent fingers.
 
     python tools/measure_hands.py [--out data/hand_shapes.npz]
 
-What lifting beyond the paper knows of hands: of the body for development whose palm is of middle size, none
-that is held out. Every finger bends on its own and evenly between the limits of its joints, its end joint
-with the one before; the poses of rendered people have no part in it. Seeds are fixed: the same body model
-gives the same shapes.
+The hand shapes of the robust lifting, from the development body with the median palm size. Every finger bends
+independently and uniformly within the limits of its joints, its end joint with the one before; the poses of
+rendered people are not used. Seeds are fixed: the same body model gives the same shapes.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Measure every shape of the body model: how thick trunk and limbs are, and where markers are taped on.
+"""Measure every shape of the body model: thickness of trunk and limbs, and positions of markers.
 
     python tools/measure_sizes.py [--out data/body_sizes.npz]
 
-Poses are drawn so that arms keep clear of the body, and markers of motion capture sit on the skin. Nothing is
-random: the same body model gives the same numbers.
+They serve to sample poses without self-collision, and to place markers of motion capture on the skin. Nothing
+is random: the same body model gives the same numbers.
 """
 
 from __future__ import annotations

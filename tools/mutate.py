@@ -1,10 +1,10 @@
-"""How strong are the tests? Changes operators and constants at random; a package's own tests must notice.
+"""Mutation testing: change operators and constants at random; a package's own tests must fail.
 
     make mutants MUTANTS_ARGS="--n 60 --seed 1"
 
 Every mutant is one change in a copy of the checkout, where only the tests of its package run, to the first
-that fails. What survives is printed. Mutants that change nothing anybody could see are named, each with its
-reason, in `tools/equivalent_mutants.toml`, and are not drawn. Ends with 1 below `FLOORS`.
+that fails. Surviving mutants are printed. Mutants without an observable effect are listed, each with its
+reason, in `tools/equivalent_mutants.toml`, and are not sampled. Exits with 1 below `FLOORS`.
 """
 
 from __future__ import annotations

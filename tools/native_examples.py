@@ -1,10 +1,10 @@
-"""Make `data/examples/native/`: three annotated images and what each tool would write about them.
+"""Make `data/examples/native/`: three annotated images and each tool's files for them.
 
     python tools/native_examples.py [OUT]
 
-Invented people, no images: `annotations.json`, and a folder per format to try the import with. The first
-image has two people, the second nobody, the third one person; the tools also saw a fourth image that is
-not annotated. Every tool finds the people a few pixels off, with scores in its own scale.
+Made-up people, no images: `annotations.json`, and a folder per format to try the import with. The first image
+has two people, the second none, the third one person; the tools also have results for a fourth image that is
+not annotated. Every tool's keypoints are off by a few pixels, with scores in its own scale.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Files as other pose tools write them, made from people whose keypoints are known.
+"""Files in other pose tools' formats, made from people with known keypoints.
 
-What the importers are tested, timed and shown with. Every layout is spelled out by the names of its
-keypoints, after the tools' documentation, not taken from the library's maps; numbers have the precision
-of the tools (single precision, or six digits for OpenPose).
+For tests, benchmarks and examples of the importers. Every layout is written out with the names of its
+keypoints, from the tools' documentation and not from the library's maps; numbers have the precision of the
+tools (single precision, or six digits for OpenPose).
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Keep a run of the report as the reference run of its profile, which others are compared with.
+"""Store a run of the report as the reference run of its profile, for comparison with other runs.
 
     python tools/reference.py results/full
 
-Writes `data/reference/full/`: of every notebook the values, the tables it shows and its stamp. The run has to
-be of one commit, without changes, so that it can be repeated.
+Writes `data/reference/full/`: for every notebook its values, the tables it shows and its stamp. The run must
+be of a single commit, without changes, so that it can be repeated.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ def calibration_fit(annotations: Path, detections: Path, detector: str, out: Pat
 
 
 @calibration.command("apply")
-@click.option("--calibrations", type=PATH, required=True, help="Of `fit`, or the report's Parquet file.")
+@click.option("--calibrations", type=PATH, required=True, help="From `calibration fit` or the report.")
 @click.option("--detector", default="", help="Detector; needed if the file has several.")
 @click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
 @click.option("--out", type=PATH, required=True, help="Results to write; keeps the original scores too.")

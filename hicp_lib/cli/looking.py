@@ -28,17 +28,17 @@ def inspect_(path: Path, as_json: bool) -> int:
 
 @click.command()
 @click.option("--detections", type=PATH, required=True, help="What `hicp detect` or `hicp import` wrote.")
-@click.option("--images", type=PATH, required=True, help="Folder of the pictures.")
+@click.option("--images", type=PATH, required=True, help="Folder of the images.")
 @click.option("--annotations", type=PATH, help="Annotations: drawn too, and used to sort.")
 @click.option("--out", type=PATH, required=True, help="An .html page, or a new folder for PNG files.")
 @click.option("--limit", default=100, show_default=True, type=click.IntRange(min=1),
-              help="At most so many pictures, worst first.")  # fmt: skip
+              help="Maximum number of images, worst first.")  # fmt: skip
 @click.option("--min-score", default=0.1, show_default=True, type=FiniteRange(0, 1),
               help="In PNG files, keypoints below it are left out; a page has a slider.")  # fmt: skip
 def draw(
     detections: Path, images: Path, annotations: Path | None, out: Path, limit: int, min_score: float
 ) -> None:
-    """Draw detections over their pictures, worst first: an HTML page, or PNG files."""
+    """Draw detections over their images, worst first: an HTML page, or PNG files."""
     from hicp_lib.formats.annotations import read_annotations, read_detections
     from hicp_lib.inspection.gallery import image_paths, pictures, write_page, write_pngs
 

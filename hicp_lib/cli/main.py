@@ -165,12 +165,12 @@ def dataset() -> None:
 
 
 @dataset.command("create")
-@click.option("--annotations", type=PATH, required=True, help="In COCO's layout.")
+@click.option("--annotations", type=PATH, required=True, help="Annotations in COCO's layout.")
 @click.option("--images", type=PATH, required=True, help="Folder of the images.")
 @_keypoint_map_option
 @click.option("--out", type=PATH, required=True, help="Where basic/ and headless/ are written.")
 @click.option("--min-pixels", default=20_000, show_default=True, type=click.IntRange(min=1))
-@click.option("--orientation", type=click.Choice(["stored", "seen"]), help="If images are flagged.")
+@click.option("--orientation", type=click.Choice(["stored", "seen"]), help="Of images with a rotation flag.")
 def dataset_create(out: Path, annotations: Path, images: Path, **options) -> None:
     """Crop people from annotated images: Basic, and Headless without their heads."""
     from hicp_lib.datasets.subsets import create_hicp, notes
@@ -262,11 +262,11 @@ def export(detections: Path, kind: str, layout: str, annotations: Path | None, o
 
 
 @hicp.command()
-@click.option("--annotations", type=PATH, required=True, help="In COCO's layout.")
+@click.option("--annotations", type=PATH, required=True, help="Annotations in COCO's layout.")
 @click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
 @_keypoint_map_option
-@click.option("--group", help="body (17 points) or hand (42; and each); both if not given.")
-@click.option("--sigmas", help="halpe or wholebody; else halpe, of each hand wholebody.")
+@click.option("--group", help="body (17 points) or hand (42, and each hand alone); both if not given.")
+@click.option("--sigmas", help="halpe or wholebody; default: halpe, for each hand alone wholebody.")
 @click.option("--area", default="segment", show_default=True, help="Or box, box53 (0.53 x box), source.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the bootstrap.")
 @click.option("--by-image", is_flag=True, help="Also the OKS of each image's people; worst first.")

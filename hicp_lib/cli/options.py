@@ -52,7 +52,7 @@ class FiniteRange(click.FloatRange):
 
 people_option = click.option(
     "--people", default="held-out", show_default=True, type=click.Choice(["development", "held-out"]),
-    help="Tune methods on development people only.",
+    help="Split of the identities; tune methods on development only.",
 )  # fmt: skip
 
 
@@ -89,7 +89,7 @@ def detector_options(command: Callable) -> Callable:
         click.option("--boxes", help="Where people's boxes come from: gt, image or detected."),
         click.option("--person-model", type=PATH, help="ONNX file that finds the boxes (YOLOX, RTMDet)."),
         click.option("--model", type=PATH, help="The detector's weights, for those that run on yours."),
-        click.option("--detector", required=True, help="Its name; a wrong one lists all names."),
+        click.option("--detector", required=True, help="Name of the detector; an unknown one lists all."),
     ):  # fmt: skip
         command = option(command)
     return command

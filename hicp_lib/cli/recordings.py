@@ -21,9 +21,9 @@ def record() -> None:
 @click.argument("out", type=PATH)
 @click.option("--n-frames", type=click.IntRange(min=1), help="The scenario's own number if not given.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0))
-@click.option("--subject", "number", default=0, show_default=True, type=click.IntRange(min=0), help="Who.")
+@click.option("--subject", "number", default=0, show_default=True, type=click.IntRange(min=0), help="Person.")
 @people_option
-@click.option("--depth-camera", "camera", default="d435", show_default=True, help="Or azure-kinect.")
+@click.option("--depth-camera", "camera", default="d435", show_default=True, help="d435 or azure-kinect.")
 @worker_options("Processes")
 def simulate(
     scenario: str, out: Path, n_frames: int | None, seed: int, number: int, people: str, camera: str, workers

@@ -154,7 +154,7 @@ def code(
             modules[name] = _read(path, *_state(path))
             waiting += [name.rpartition(".")[0], *modules[name].imports]
         elif name.startswith("hicp_lib."):
-            waiting.append(name.rpartition(".")[0])  # something within a module
+            waiting.append(name.rpartition(".")[0])  # a name inside a module
         elif name:
             others.add(name.partition(".")[0])
     patterns = frozenset().union(*(module.data for module in modules.values()))

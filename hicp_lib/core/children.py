@@ -35,7 +35,7 @@ def child_environment(**variables: str) -> dict[str, str]:
 @contextmanager
 def safe_start() -> Iterator[None]:
     """A block in which multiprocessing starts processes, with one thread each in linear algebra."""
-    untrusted = {Path.cwd()} - {Path(__file__).resolve().parents[2]}  # a checkout that is not installed
+    untrusted = {Path.cwd()} - {Path(__file__).resolve().parents[2]}  # except an uninstalled checkout
     with with_variables(**_SAFE_PATH, **ONE_THREAD):  # one thread at a time
         before = sys.path
         sys.path = [entry for entry in before if Path(entry).resolve() not in untrusted]
@@ -54,7 +54,7 @@ def begin(pipe: Connection) -> None:
         Its other end is open as long as the pool is.
     """
     end_with(pipe.fileno())
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the caller's, who ends this one
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # handled by the caller, which ends this process
     import cv2
 
     cv2.setNumThreads(1)

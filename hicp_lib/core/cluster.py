@@ -119,7 +119,7 @@ def connected(address: str) -> Iterator[Client]:
     soon_s = raised(SOON_S)
     with _quiet():
         try:
-            with ThreadPoolExecutor(1) as thread:  # a notebook's own has a loop already
+            with ThreadPoolExecutor(1) as thread:  # a notebook's thread already has an event loop
                 thread.submit(asyncio.run, _greet(address, soon_s)).result()
             client = Client(address, timeout=soon_s)
         except Exception as error:  # another kind of server may answer anything

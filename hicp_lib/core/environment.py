@@ -1,4 +1,4 @@
-"""What a process is given by its surroundings: cores, and variables that something reads when it starts."""
+"""Environment of a process: cores, and variables that libraries read when they start."""
 
 import os
 import threading
@@ -15,9 +15,9 @@ def usable_cores() -> int:
 
 @contextmanager
 def with_variables(**variables: str) -> Iterator[None]:
-    """Set variables of this process for a block, which is to be short: they are everybody's.
+    """Set variables of this process for a block, which must be short, since they are global.
 
-    Of several threads one at a time does so, and then all is as it was before.
+    Only one thread at a time does so; afterwards the old values are restored.
     """
     with _lock:
         before = {name: os.environ.get(name) for name in variables}

@@ -120,8 +120,8 @@ def run_jobs(
                     yield key, future and future.result()
             except BrokenProcessPool:
                 raise InputError(
-                    "a worker process was killed (is memory short?); run the same command again to go "
-                    "on, with fewer workers if it happens again"
+                    "a worker process was killed (is memory short?); run the same command again to "
+                    "continue, with fewer workers if it happens again"
                 ) from None
 
 

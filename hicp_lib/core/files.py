@@ -68,7 +68,7 @@ def atomic_path(path: str | Path, sync: bool = True) -> Iterator[Path]:
     temporary = partial_name(path.parent, path.suffix)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # less the caller's mask
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # minus the caller's umask
         with held(temporary):
             yield temporary
             if sync:
@@ -194,7 +194,7 @@ def regular_file(path: str | Path, expected: str, max_bytes: float = math.inf) -
     """
     try:
         state = os.stat(path)
-    except (OSError, ValueError) as error:  # a name that no file can have
+    except (OSError, ValueError) as error:  # ValueError: an invalid file name
         why = getattr(error, "strerror", "no file has such a name")
         raise InputError(f"{path}: cannot be read ({why}); {expected}") from None
     if not stat.S_ISREG(state.st_mode):

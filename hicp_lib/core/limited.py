@@ -19,7 +19,7 @@ from hicp_lib.core.children import ONE_THREAD, child_environment, end_with, life
 from hicp_lib.core.errors import InputError
 
 LIMITS_VARIABLE = "HICP_LIMITS"
-_LEAST_S, _S_PER_BYTE, _MOST_S_PER_BYTE = 4.0, 1e-6, 1e-4  # of computing; the last one for readers that go on
+_LEAST_S, _S_PER_BYTE, _MOST_S_PER_BYTE = 4.0, 1e-6, 1e-4  # of computing; the last one with `went_on`
 _LEAST_BYTES, _BYTES_PER_BYTE = 800 * 2**20, 40  # of memory
 _PROGRAM = """import sys; at = [*("-packages" in folder for folder in sys.path), True].index(True)
 sys.path.insert(at, sys.argv[1]); from hicp_lib.core import limited; limited.serve()"""

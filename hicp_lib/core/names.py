@@ -3,7 +3,7 @@
 import re
 from pathlib import PureWindowsPath
 
-_UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")  # control characters, halves of characters
+_UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")  # control characters, lone surrogates
 
 
 def is_inside(name: object) -> bool:

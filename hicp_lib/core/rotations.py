@@ -5,7 +5,7 @@ from math import cos, sin, sqrt
 
 import numpy as np
 
-_PARALLEL = 1e-9  # sine of the angle below which two directions are one, or opposite
+_PARALLEL = 1e-9  # sine of the angle below which directions count as parallel
 
 
 def rotations_from_vectors(vectors: np.ndarray) -> np.ndarray:

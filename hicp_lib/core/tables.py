@@ -12,8 +12,8 @@ from hicp_lib.core.extras import require
 from hicp_lib.core.files import read_bytes
 from hicp_lib.core.limited import raised
 
-_MAX_COLUMNS = 1000  # of ten thousand of a name pandas makes names that differ for minutes
-_CELLS, _CELLS_PER_BYTE = 5e6, 20  # a file of a megabyte can stand for billions
+_MAX_COLUMNS = 1000  # pandas takes minutes to rename ten thousand equal names
+_CELLS, _CELLS_PER_BYTE = 5e6, 20  # a compressed megabyte can expand to billions
 # Numbers are read to the last bit; pandas 3.1 and later do so without being asked, and warn of the question.
 _IS_OLD = tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1)
 _EXACT: dict[str, Any] = {"float_precision": "round_trip"} if _IS_OLD else {}
@@ -58,7 +58,7 @@ def read_table(path: str | Path, columns: Sequence[str], **options: Any) -> pd.D
             if len(found) > _MAX_COLUMNS:
                 raise ValueError(f"{len(found)} columns")
             table = pd.read_csv(BytesIO(content), skipinitialspace=True, **_EXACT, **options)
-    except Exception as error:  # of the libraries' many kinds
+    except Exception as error:  # the libraries raise many kinds
         raise InputError(f"{path}: cannot be read as a table ({one_line(error)}); {expected}") from None
     for name in columns:
         if (n := found.count(name)) != 1:

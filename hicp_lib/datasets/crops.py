@@ -3,11 +3,11 @@
 After Docekal et al. 2022, section III-A. The paper says that people are cropped by their boxes, and that
 crops of at least 20,000 pixels are kept. The rest was chosen here:
 
-- A box is rounded outwards to whole pixels and clipped to the image. Keypoint u lies in pixel column i when i
-  - 0.5 <= u < i + 0.5; keypoints outside the crop are no longer labelled. Boxes end at the edges of pixels,
-  and tools that draw boxes around keypoints measure those from the edges, too. So a crop is enlarged by a
-  pixel if a keypoint in its person's box, or on its edge, would be lost, and a keypoint between the image's
-  last pixel centres and its edge is moved onto these pixels.
+- A box is rounded outwards to whole pixels and clipped to the image. Keypoint u lies in pixel column i when
+  it is in [i - 0.5, i + 0.5); keypoints outside the crop are no longer labelled. Boxes end at the edges of
+  pixels, and tools that draw boxes around keypoints measure those from the edges, too. So a crop is enlarged
+  by a pixel if a keypoint in its person's box, or on its edge, would be lost, and a keypoint between the
+  image's last pixel centres and its edge is moved onto these pixels.
 - The segment's area is reduced in proportion to the part of the box that remains.
 """
 

@@ -1,7 +1,7 @@
 """HiCP: make the Basic and Headless datasets of people at close range from any annotated images.
 
 The rules are those of `hicp_lib.datasets.crops` and `hicp_lib.datasets.heads`; where the paper leaves it
-open, people are treated so:
+open, people are selected so:
 
 - Crowds, and people without a labelled keypoint in the crop, are left out of both.
 - People without a labelled head keypoint in the crop are not part of Headless: their head may be visible

@@ -44,7 +44,7 @@ from hicp_lib.simulation.world.visibility import keypoint_visibility
 
 LEVELS: dict[str, list[float]] = MOVEMENTS["doses"]
 DISTANCE_M, EYE_M = 2.5, 1.3
-_UNCHANGED = {"distance": DISTANCE_M, "light": 1.0, "hidden": 0.0, "resolution": 640}  # at these levels
+_UNCHANGED = {"distance": DISTANCE_M, "light": 1.0, "hidden": 0.0, "resolution": 640}  # unmodified
 _KEY_LENGTH = 16  # of a data set's folder
 _WIDTH_PX, _HEIGHT_PX, _FOCAL_PX = 480, 640, 560.0
 _PERSON_Y_M, _BOARD_M, _BOARD_HALF_M = 1.2, 0.85, 0.6

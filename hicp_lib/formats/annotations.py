@@ -39,8 +39,8 @@ from hicp_lib.formats.layouts import PERSON_CATEGORY, PersonCategory, layouts_of
 from hicp_lib.formats.number_lists import read_people
 from hicp_lib.formats.units import corners_note, doubts, refuse_fractions
 
-SEGMENT_OF_BOX = 0.53  # area of a person's segment over that of the box, as tools take it
-_LEAST_AREA, _MOST_AREA = 0.01, 2.0  # of a person, as a share of their box; another one stands for none
+SEGMENT_OF_BOX = 0.53  # typical ratio of the segment's area to the box's, as other tools use it
+_LEAST_AREA, _MOST_AREA = 0.01, 2.0  # plausible areas of a person, relative to the box
 PERSON = {"id": PERSON_CATEGORY, "name": "person", "supercategory": "person"}
 MAX_SIDE_PX = 100_000
 _KNOWN_KEYS = {
@@ -169,7 +169,7 @@ def rows_by_image(image_ids: np.ndarray) -> dict[int, np.ndarray]:
     """
     order = np.argsort(image_ids, kind="stable")
     ids, starts = np.unique(image_ids[order], return_index=True)
-    return dict(zip(ids.tolist(), np.split(order, starts[1:]), strict=False))  # of no ids: one empty part
+    return dict(zip(ids.tolist(), np.split(order, starts[1:]), strict=False))  # without ids: one empty part
 
 
 def source_images(annotations: Annotations) -> dict[int, int]:
@@ -341,7 +341,7 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     _of_people(rows, replace(category, others=set()), {category.id, PERSON_CATEGORY} - category.others)
     image_ids = rows.integers("image_id") if annotations is None else _images_of(rows, annotations.images)
     triples, _ = rows.keypoints()
-    del rows  # hundreds of thousands of people are held once
+    del rows  # so that large data are held in memory once
     keypoints = triples[..., :2]
     np.copyto(keypoints, np.nan, where=~triples.any(axis=-1, keepdims=True))
     refuse_fractions(path, keypoints)

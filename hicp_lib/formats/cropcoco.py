@@ -18,8 +18,8 @@ from hicp_lib.formats.json_validation import Rows, is_number
 FLAG_OUTSIDE = 3.0
 OUTSIDE = -1.0  # in `Annotations.visibility`: not labelled in the picture, but known to lie outside it
 PAD_KEY = "pad_to_contain"
-PADDING = 1.25  # how many times its box a top-down network sees of a person
-_SLACK_PX = 1.0  # by which a place may be rounded into the picture
+PADDING = 1.25  # factor by which a top-down network's window exceeds the box
+_SLACK_PX = 1.0  # by which a position may be rounded into the picture
 
 
 def outside_from_flags(rows: Rows, triples: np.ndarray, sizes_px: np.ndarray) -> np.ndarray:

@@ -29,7 +29,7 @@ from hicp_lib.formats.number_lists import read_people
 
 SUFFIXES = (".json", ".csv", ".parquet")
 _BUFFER_BYTES = 2**20
-_PEOPLE_AT_ONCE = 1000  # of a table; a group of rows of Parquet
+_PEOPLE_AT_ONCE = 1000  # per batch of a table, a row group of Parquet
 _Append = Callable[..., None]
 
 

@@ -18,7 +18,7 @@ from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES, TO_HALPE
 
 # Larger than any image or detector output, and small enough for squares and products.
 MAX_ABS = 1e9
-MAX_INTEGER = 2**53  # every JSON reader has them exact up to here
+MAX_INTEGER = 2**53  # exact in every JSON reader up to here
 CONVENTIONS = {17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"}
 Layouts = Mapping[int, str | np.ndarray]
 Flat = list | np.ndarray
@@ -253,7 +253,7 @@ class Rows:
                 array = np.array(lists, dtype=float).reshape(len(lists), width)
                 if (np.abs(array) <= MAX_ABS).all():
                     return array
-        except OverflowError:  # a whole number beyond floats
+        except OverflowError:  # an integer too large for floats
             pass
         of = list(map(_listed, lists))
         i, j = next((i, j) for i, row in enumerate(of) for j, x in enumerate(row) if not _is_finite(x))
@@ -296,7 +296,7 @@ def is_number(value: object) -> TypeGuard[float]:
     """
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return False
-    number: Any = value  # types of NumPy do not say that they have a size
+    number: Any = value  # NumPy's types lack this in their annotations
     return bool(abs(number) <= sys.float_info.max)
 
 

@@ -28,9 +28,9 @@ from hicp_lib.core.files import read_json
 from hicp_lib.core.keypoints import COCO_17, COCO_NAMES, INDEX, NAMES, TO_HALPE
 from hicp_lib.formats.json_validation import CONVENTIONS, Layouts, Rows
 
-PERSON_CATEGORY = 1  # where a file does not name its categories
+PERSON_CATEGORY = 1  # if a file does not name its categories
 _PEOPLE = ("person", "persons", "people", "human", "humans", "pedestrian")
-_NEAR = re.compile("upper.?neck|head.?bottom|foot", re.IGNORECASE)  # told when they are taken for another
+_NEAR = re.compile("upper.?neck|head.?bottom|foot", re.IGNORECASE)  # reported when read as another keypoint
 _TOPPED = [{NAMES[i] for i in TO_HALPE[of]} for of in ("crowdpose14", "halpe26", "halpe136")]
 
 
@@ -158,7 +158,7 @@ def layouts_of(
     ours = _meanings(where, names, given)
     indices = np.array([INDEX.get(name, -1) for name in ours])
     layouts: dict[int, str | np.ndarray] = {len(names): indices}
-    if indices[:17].tolist() == COCO_17.tolist():  # of WholeBody the body is named, of Human-Art four more
+    if indices[:17].tolist() == COCO_17.tolist():  # WholeBody names only the body, Human-Art four more
         layouts |= {17: "coco17"} | ({133: "wholebody133"} if len(names) == 17 else {})
     pairs = list(zip(names, ours, strict=True))
     lists = {

@@ -20,7 +20,7 @@ from hicp_lib.core.limited import raised
 _KEY = b'"keypoints"'
 _LIST = re.compile(rb'(?<=[{,\s])"keypoints"\s*:\s*\[([^][{}"]+)\]')
 _BLOCK_BYTES = 2**24
-_MAX_BYTES = 4 * MAX_BYTES  # of a file: of its numbers, arrays hold less than half
+_MAX_BYTES = 4 * MAX_BYTES  # of a file; arrays of its numbers need less than half
 
 
 def read_people(path: str | Path) -> Any:
@@ -51,7 +51,7 @@ def read_people(path: str | Path) -> Any:
                 arrays += found
         data = orjson.loads(b"".join(parts))
     except (OSError, orjson.JSONDecodeError):
-        return read_json(path)  # tells what is amiss
+        return read_json(path)  # raises the error
     people = data.get("annotations") if isinstance(data, dict) else data
     rows = [row for row in people if isinstance(row, dict)] if isinstance(people, list) else []
     marked = [row for row in rows if isinstance(of := row.get("keypoints"), str) and of.startswith(mark)]
@@ -74,7 +74,7 @@ def _blocks(file: BinaryIO) -> Iterator[bytes]:
 def _arrays(texts: list[bytes]) -> list[np.ndarray]:
     """Arrays from the texts of lists; None if one contains anything but numbers."""
     lists = orjson.loads(b"[[" + b"],[".join(texts) + b"]]")
-    if not set(map(type, chain.from_iterable(lists))) <= {int, float}:  # numpy would take True for 1
+    if not set(map(type, chain.from_iterable(lists))) <= {int, float}:  # numpy would accept True as 1
         return []
     ends = list(accumulate(map(len, lists)))
     # Memory pages of their own, which return to the system as soon as the lists are no longer needed.

@@ -8,16 +8,16 @@ from numpy.typing import ArrayLike
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX
 
-_FRACTION = 1.5  # as large as fractions of an image get, when keypoints lie a little outside of it
-_SIGNED = -0.25  # below it they begin at -1: of a few that begin at 0, some lie a little outside
-_AT_ONCE = 2**12  # people looked at at a time
-_LEAST_POINTS = 3  # fewer may lie at the corner of an image by chance
+_FRACTION = 1.5  # largest fractions of an image, with keypoints slightly outside
+_SIGNED = -0.25  # below it, fractions start at -1: those from 0 are only slightly negative
+_AT_ONCE = 2**12  # people processed at a time
+_LEAST_POINTS = 3  # fewer may be at an image's corner by chance
 _SLACK_PX = 1.0
-_FEW = 0.02  # of the labels, which lie outside their images in public data sets, too
+_FEW = 0.02  # fraction of labels outside their images that occurs in public data sets
 _SHOULDERS, _HIPS = ([INDEX[f"left_{part}"], INDEX[f"right_{part}"]] for part in ("shoulder", "hip"))
 _FALLEN = "most shoulders are below hips; is the origin the bottom?"
-_CERTAIN = 10  # people, of whom none contradicts
-_MUCH = 0.25  # of a box's side: less from the image's corner, and its two readings are nearly one
+_CERTAIN = 10  # number of people, without a contradiction
+_MUCH = 0.25  # of a box's side: nearer to the image's corner, both readings are similar
 
 
 def refuse_fractions(path: Path | str, points_px: np.ndarray, what: str = "keypoints") -> None:

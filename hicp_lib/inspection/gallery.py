@@ -191,7 +191,7 @@ def write_page(chosen: list[Picture], out: Path, title: str, note: Note = print)
         "has_truth": any(picture.truth is not None for picture in chosen),
         "colours": {"truth": _TRUTH_COLOUR, "found": _FOUND_COLOUR},
     }  # fmt: skip
-    data = json.dumps(content, allow_nan=False).replace("<", "\\u003c")  # ends no script element
+    data = json.dumps(content, allow_nan=False).replace("<", "\\u003c")  # cannot end the script element
     page = (DATA_DIR / "gallery.html").read_text(encoding="utf-8")
     write_bytes(out, page.replace("GALLERY_DATA", data).encode())
 

@@ -128,7 +128,7 @@ def inspect(path: str | Path) -> Facts:
     kind, path = identify(Path(path))
     try:
         facts = _describe(kind, path)
-    except Exception as error:  # of the libraries' many kinds
+    except Exception as error:  # the libraries raise many kinds
         facts = Facts(problem=one_line(error).removeprefix(f"{path}: "))
     fixed = {} if facts.problem or facts.kind else kind.get("needs", {})
     needs = {of: f"{fixed.get(of, '')} {facts.needs.get(of, '')}".strip() for of in {**fixed, **facts.needs}}

@@ -13,13 +13,13 @@ from hicp_lib.lifting.paper import has_depth
 
 _IS_BODY = np.isin(np.arange(N_KEYPOINTS), BODY)
 # Chosen on development people, as the costs in `limb_lengths` and `hand_shapes`: see `robust`.
-RADIUS_M = np.where(_IS_BODY, 0.022, 0.013)  # how far around a keypoint surfaces are looked at
-_SIGMA_M = np.where(_IS_BODY, 0.010, 0.008)  # depths that differ so much cost 1
+RADIUS_M = np.where(_IS_BODY, 0.022, 0.013)  # radius around a keypoint in which surfaces are sampled
+_SIGMA_M = np.where(_IS_BODY, 0.010, 0.008)  # a difference in depth that costs 1
 _SIGMA_M[[INDEX["left_wrist"], INDEX["right_wrist"]]] = 0.015
 _SAMPLES = 7  # per side of the neighbourhood
 _STEEP_M = 0.03  # a larger difference between the pixels on both sides is a step in depth
 _ON_STEP = 1.0  # cost of a surface there
-_HIDDEN = np.where(_IS_BODY, 5.0, 2.0)  # cost of lying behind the nearest surface
+_HIDDEN = np.where(_IS_BODY, 5.0, 2.0)  # cost of a depth behind the nearest surface
 _IN_FRONT = 20.0  # and in front of it
 
 

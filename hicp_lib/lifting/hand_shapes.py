@@ -29,16 +29,16 @@ FINGERS = (np.arange(1, 5), *(np.arange(knuckle + 1, knuckle + 4) for knuckle in
 """The moving keypoints of each finger, thumb first."""
 _FINGER_OF = np.where(np.isin(np.arange(21), PALM), -1, (np.arange(21) - 1) // 4)
 
-_LEAST_OF_PALM = 4  # fewer of it found do not tell how it is turned
+_LEAST_OF_PALM = 4  # fewer points do not determine its orientation
 _SIZES, _SIZE_SIGMA = (0.88, 0.96, 1.04, 1.12), 0.1
 _N_TURNS = 600  # about 25 degrees apart
-_N_FITTING, _N_PLACES = 200, 40  # palms kept by their place in the image, and of these with depths
-_REACH_M, _STEP_M = 0.15, 0.01  # depths tried around the palm as it is seen
+_N_FITTING, _N_PLACES = 200, 40  # palms kept by their image positions, and of these with depths
+_REACH_M, _STEP_M = 0.15, 0.01  # depths tried around the apparent palm
 _PALM_SIGMA_M, _FINGER_SIGMA_M = 0.012, 0.010  # misfit across the line of sight that costs 1
-_MOST = 9.0  # of the cost of a keypoint's misfit, and of its depth
-_LIKELY = 2.0  # a fit that costs so much more weighs 1/e of the best
-_DEPTH_SIGMA_M, _MOST_DEPTH = 0.006, 20.0  # cost of depths other than the fit's, where it decides
-_BESIDE_M, _BEHIND_M = 0.015, 0.010  # a keypoint so near a limb in the image, so far behind it, is hidden
+_MOST = 9.0  # maximum cost of a keypoint's misfit, and of its depth
+_LIKELY = 2.0  # a fit with a cost higher by this has 1/e of the best one's weight
+_DEPTH_SIGMA_M, _MOST_DEPTH = 0.006, 20.0  # cost of depths other than the fit's, for hidden keypoints
+_BESIDE_M, _BEHIND_M = 0.015, 0.010  # a keypoint this near a limb, and this far behind, is hidden
 
 
 @memoised()

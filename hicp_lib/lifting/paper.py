@@ -177,7 +177,7 @@ def _half_widths(depth_m: np.ndarray, at: np.ndarray, radius_px: np.ndarray) -> 
         for some in _blocks(lost, reach):
             half[some] = _sizes_that_reach(depth_m, at[:, some], radius_px[some], reach)
         lost = lost[half[lost] < 0]
-    return np.maximum(half, 0)  # a hole that nothing reaches is alone, and has no depth
+    return np.maximum(half, 0)  # a hole that no pixel reaches has no depth
 
 
 def _sizes(radius_px: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
@@ -194,7 +194,7 @@ def _sizes_that_reach(depth_m: np.ndarray, at: np.ndarray, radius_px: np.ndarray
     pieces, _, _ = _windows(depth_m, at, reach)
     order, away = _disk(reach)
     sizes = _sizes(radius_px[:, None], pieces.reshape(len(pieces), -1)[:, order])
-    nearest = (sizes >= away).argmax(axis=1)  # the first, and the first of all where there is none
+    nearest = (sizes >= away).argmax(axis=1)  # the first one, or the first of all if there is none
     sizes = sizes[np.arange(len(sizes)), nearest]
     return np.where(sizes >= away[nearest], sizes, -1)
 

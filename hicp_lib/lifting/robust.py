@@ -57,8 +57,8 @@ METHODS = {"robust": len(STEPS), "paper": 0}
 """Lifting methods, by how many of `STEPS` they take."""
 
 _REACH_M, _GRID_M = 0.90, 0.02  # grid of depths around the person's centre
-_END_ON = 0.5  # a joint is deeper by so much of its depth below the skin when its limb points at the camera
-_SEEN_SIGMA_M = 0.012  # of depths that are seen, beyond what their costs tell
+_END_ON = 0.5  # fraction of the depth below the skin that is added if the limb points at the camera
+_SEEN_SIGMA_M = 0.012  # of seen depths, in addition to what their costs give
 _IN_BODY, _IN_FACE = (np.isin(np.arange(N_KEYPOINTS), part) for part in (BODY, FACE))
 _COST_SEEN, _COST_GUESSED = 0.5, np.where(_IN_BODY, 5.0, 3.0)  # a depth costing so much more is 1/e as likely
 _HANDS = {"left": LEFT_HAND, "right": RIGHT_HAND}

@@ -28,7 +28,7 @@ with needs("report"):
 
 CLICKS_FILE = "clicks.csv"
 COLUMNS = ["frame", "marker", "u_px", "v_px"]
-_MARGINS_PX = 160  # of the figure, beside the image
+_MARGINS_PX = 160  # of the figure, around the image
 
 
 def read_clicks(path: str | Path, recording: Recording, markers: Sequence[str]) -> pd.DataFrame:

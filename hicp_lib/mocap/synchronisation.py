@@ -21,12 +21,12 @@ _LEAST_S, _SMOOTHED_PERIODS, _GAP_PERIODS = 0.25, 2.0, 2.5
 _MAX_SPEED_M_S = 0.5
 _MIN_OVERLAP_S = 2.0
 _MAX_DRIFT_S = 0.5
-_STAMP_ERROR_S = 5e-7  # stamps in files are decimal
-_MIN_SHARE = 0.5  # of what was seen on the one clock, to be seen on the other as well
-_STANDING_M2_S2 = 1e-6  # variance of speeds, summed, of what stands still
-_FIT_ALIKE = np.log(20)  # an offset that much less likely than the best one is not in question
-_OVERLAP_GIVEN = 4 / 3  # an offset at which less was seen, by up to this, is judged as if as much had been
-_LEAST_RESIDUAL = 1e-4  # share of the variance; speeds that agree better say no more
+_STAMP_ERROR_S = 5e-7  # timestamps in files are decimal
+_MIN_SHARE = 0.5  # fraction of samples on one clock with a counterpart on the other
+_STANDING_M2_S2 = 1e-6  # sum of variances of speeds below which nothing moves
+_FIT_ALIKE = np.log(20)  # log ratio below the best beyond which an offset is excluded
+_OVERLAP_GIVEN = 4 / 3  # factor of missing samples that is compensated for other offsets
+_LEAST_RESIDUAL = 1e-4  # fraction of the variance; closer agreement is not counted
 
 
 @dataclass(frozen=True)

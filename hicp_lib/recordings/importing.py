@@ -25,7 +25,7 @@ from hicp_lib.recordings.writer import JPEG_QUALITY, Poses, write_index
 
 METADATA = ("intrinsic.json", "camera_intrinsic.json")
 _IMAGE_KINDS = (".png", ".jpg", ".jpeg")
-_MOST = 1e11  # seconds, and degrees: more is neither
+_MOST = 1e11  # larger values are neither seconds nor degrees
 _RATES_HZ = (0.001, 10_000.0)
 
 

@@ -21,7 +21,7 @@ _COMMENTED = re.compile(r"((?:^#.*\n)+)(\w+)", re.MULTILINE)
 _NUMBER = r"(\d+(?:\.\d+)?)"
 _FROM = re.compile(rf"{_NUMBER} or more|from {_NUMBER} |{_NUMBER} to|above {_NUMBER}")
 _UP_TO = re.compile(rf"\d to (?:below )?{_NUMBER}")
-_MOST, _SHOWN = 2.0**63, 80  # numbers, characters of a refused value
+_MOST, _SHOWN = 2.0**63, 80  # largest number; characters of a refused value
 
 
 @dataclass(frozen=True)

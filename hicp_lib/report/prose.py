@@ -214,7 +214,7 @@ def render_page(source: Path, results: Results, profile: str) -> str:
         If the page uses a name that does not exist, or is not a valid template.
     """
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.finalize = lambda value: escaped(value) if type(value) is str else value  # not of Markup
+    environment.finalize = lambda value: escaped(value) if type(value) is str else value  # except Markup
     offered = ("value", "raw", "table", "rows", "figure", "stamp", "repetition")
     names = {name: getattr(results, name) for name in offered}
     names |= {"data": lambda name: json.loads((DATA_DIR / name).read_text())}

@@ -22,11 +22,11 @@ UNTIL = {"in the first reach": "reach_m", "until they leave": "min_distance_m"}
 FIELD_M = 0.25
 """The person is near the robot's skin below this distance, about where its receptive fields start."""
 REACH_M = 0.4  # keypoints this near the post can threaten the hand
-CROSSED_M = 0.2  # reactions count from here
-MOVED_M = 0.005  # the hand has begun to give way
-LOST_S = 0.5  # without a sighting for longer, the robot has forgotten
+CROSSED_M = 0.2  # reactions are measured from here
+MOVED_M = 0.005  # the hand has started to move
+LOST_S = 0.5  # without a detection for longer, keypoints are dropped
 AT_HEAD_M = 0.15  # a keypoint of the head this near a true one is on the head
-ENOUGH_SHARE = 0.5  # of the images; a head that is found in fewer is the reason
+ENOUGH_SHARE = 0.5  # of the images; a head found in fewer is the reason
 Z = 1.96  # of 95 %
 BACK_M = 0.02  # the hand is back at its post
 SURE = 0.3  # the paper's threshold for scores

@@ -26,7 +26,7 @@ from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import Recording, open_recording, read_simulation
 
 _NEAR_M = 0.003  # the radius of the paper's other neighbourhood
-_EVERY = 50  # measurements of the markers that are judged
+_EVERY = 50  # every n-th measurement of the markers is evaluated
 _CLICK = ["frame", "marker"]
 
 

@@ -16,7 +16,7 @@ from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.study.avoidance import sure_keypoints
 
 _NEARING = ((("hand",), np.r_[9, 10, HANDS]), (("face", "scalp"), HEAD))  # regions, and their keypoints
-_EVERY = 4  # of their vertices one is looked at
+_EVERY = 4  # every n-th of their vertices is used
 
 
 def separations_before(

@@ -42,7 +42,7 @@ def test_one_byte_of_any_file_changes_the_hash(tmp_path, monkeypatch, kind):
 
 def test_the_hash_of_nothing_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(provenance, "DATA_DIR", tmp_path / "nowhere")
-    with pytest.raises(InputError, match="nowhere: .* are not there; install hicp anew"):
+    with pytest.raises(InputError, match="nowhere: .* are missing; reinstall hicp"):
         provenance.data_sha256()
 
 

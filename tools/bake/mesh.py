@@ -1,4 +1,4 @@
-"""The mesh that is kept: what can be seen from outside, and finer eyeballs than MakeHuman's."""
+"""The used part of the mesh: everything visible from outside, with finer eyeballs than MakeHuman's."""
 
 from __future__ import annotations
 

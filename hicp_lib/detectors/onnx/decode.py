@@ -50,7 +50,7 @@ def decode_quarter(maps: np.ndarray, *, needs_both_axes: bool = False) -> Decode
     return given(moved, scores)
 
 
-@np.errstate(invalid="ignore", over="ignore")  # a network may give infinity
+@np.errstate(invalid="ignore", over="ignore")  # a network may return infinity
 def decode_dark(maps: np.ndarray, kernel: int = 11) -> Decoded:
     """Heat maps (n, k, h, w), decoded aware of their distribution (Zhang et al., DARK, CVPR 2020).
 

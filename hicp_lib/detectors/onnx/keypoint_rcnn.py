@@ -26,7 +26,7 @@ _N_KEYPOINTS = 17
 _LOGIT_MIDDLE = 2.0
 _SHORT_PX, _LONG_PX = 800, 1333
 _FAMILIES = ("detectron2", "torchvision")
-_MAX_EXPONENT = 80.0  # exp() of more is no number
+_MAX_EXPONENT = 80.0  # exp() of more overflows
 # What comes out of the network, by shape behind the number of people; None stands for any size.
 _ROLES: dict[str, tuple[int | None, ...]] = {"boxes": (4,), "scores": (), "logits": (_N_KEYPOINTS,)}
 _ROLES |= {"keypoints": (_N_KEYPOINTS, 3), "maps": (_N_KEYPOINTS, None, None)}

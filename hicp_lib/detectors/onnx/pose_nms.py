@@ -13,7 +13,7 @@ from hicp_lib.core.oks import oks_terms
 
 _N_BODY, _N_FACE, _N_HANDS = 26, 68, 42
 _FACE_FACTOR, _HAND_FACTOR = 1.9, 0.55
-_HAND_AGREEMENT, _HAND_NEARNESS = 0.1, 1.5  # their weights in the similarity of whole bodies
+_HAND_AGREEMENT, _HAND_NEARNESS = 0.1, 1.5  # weights in the similarity of whole bodies
 # Points as near as these coincide, are merged, agree in their scores.
 _COINCIDENT_PX, _MERGED_PX, _AGREEING_PX = 7.0, 15.0, 1.0
 

@@ -32,7 +32,7 @@ _NOWHERE = {
     **{name: "http://127.0.0.1:9" for name in ("http_proxy", "https_proxy", "all_proxy")},
     "no_proxy": "localhost",
 }
-_FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1"}  # NumPy's, which have nothing to do there
+_FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1"}  # NumPy's threads are not needed there
 # A call takes milliseconds, and a start seconds on a busy machine.
 LIMIT_S = 120.0
 # Memory for its data, including stacks of a thread per core; and per byte of an image, which it copies.
@@ -195,7 +195,7 @@ def _unnamed_file() -> IO[bytes]:
 
 def _close(process: subprocess.Popen, files: tuple[Connection | IO[bytes], ...], owner: int) -> None:
     for file in files:
-        with suppress(OSError):  # what was not sent any more
+        with suppress(OSError):  # unsent data
             file.close()
     if owner == os.getpid():
         process.kill()

@@ -198,7 +198,7 @@ def detect_each(
     workers = resolved(workers)
     n_here = None if isinstance(workers, str) else max(1, min(workers, n_images or workers))
     asked = name, options, n_here
-    detector = _runner(*asked).detector  # it looks, too, where the caller does the work
+    detector = _runner(*asked).detector  # also used if the caller does the work
     boxes_px = boxes_px if getattr(detector, "takes_boxes", False) else None
     folder, waiting = cache_folder(detector), OrderedDict[Key, _Waiting]()
 

@@ -49,6 +49,6 @@ def download(url: str, target: Path, max_bytes: int) -> str | None:
                     return f"too slow: {file.tell()} bytes in {time.monotonic() - begin_s:.0f} s"
             if file.tell() != announced:
                 return f"ended after {file.tell()} bytes, {announced} were announced"
-    except (OSError, HTTPException, ValueError, ProcessError) as error:  # the last: within TIMEOUT_S
+    except (OSError, HTTPException, ValueError, ProcessError) as error:  # the last: the timeout
         return one_line(error).strip("<>")
     return None

@@ -151,7 +151,7 @@ def extended_table(
 
 # When a keypoint counts as given: the paper's threshold on raw scores, or a threshold on calibrated ones.
 DECISIONS = (f"score of at least {SURE}", f"calibrated score of at least {PRESENCE_CUT}")
-_FIRST_OF_PAIRS = 5  # the keypoints before are the head's
+_FIRST_OF_PAIRS = 5  # the first five keypoints are the head's
 
 
 def false_presence(

@@ -34,10 +34,10 @@ with needs("analysis"):
 MIN_SCORE = 0.3
 MAJORITY_OF = 3
 MIN_CUTOFF_HZ, BETA = 1.5, 0.02  # of the One Euro filter; beta in Hz per px/s
-MAX_GAP_S = 0.5  # over which frames still count as consecutive
-_ANY_RATE_HZ = 1.0  # the filter takes the true one from the stamps
-_ALMOST_0_S = np.finfo(float).tiny  # the filter takes a stamp of 0 for none
-_BLOCK_S = 1.0  # stretches of time that are drawn together in the bootstrap
+MAX_GAP_S = 0.5  # maximum gap between consecutive frames
+_ANY_RATE_HZ = 1.0  # the filter computes the real rate from the timestamps
+_ALMOST_0_S = np.finfo(float).tiny  # the filter treats a timestamp of 0 as missing
+_BLOCK_S = 1.0  # stretches of time that are resampled together
 
 
 def best_person(found: Sequence[Detections], min_score: float = MIN_SCORE) -> np.ndarray:

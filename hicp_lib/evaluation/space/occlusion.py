@@ -39,7 +39,7 @@ def joint_occlusion(recording: Recording, positions: pd.DataFrame) -> pd.DataFra
     points_m = transform(T_cam_base, positions[POSITION].to_numpy(float)[:, None])[:, 0]
     margins_m = positions["keypoint"].str.split("_").str[1].map(IN_FRONT_M).to_numpy(float)
     pixels_px = project(recording.intrinsics, points_m)
-    in_image = recording.intrinsics.contains(pixels_px)  # not where NaN: behind the camera
+    in_image = recording.intrinsics.contains(pixels_px)  # False for NaN (behind the camera)
     known = np.isfinite(points_m).all(axis=1)
     occlusions = np.where(known, "outside", "unknown").astype(object)
     for frame in np.unique(frames[in_image]):
@@ -47,7 +47,7 @@ def joint_occlusion(recording: Recording, positions: pd.DataFrame) -> pd.DataFra
         u, v = pixels_px[here].round().astype(int).T
         padded_m = np.pad(read_depth_m(recording, int(frame)), _HALF_WINDOW_PX, constant_values=np.nan)
         windows_m = sliding_window_view(padded_m, (2 * _HALF_WINDOW_PX + 1,) * 2)[v, u]
-        near_m = pd.DataFrame(windows_m.reshape(len(u), -1)).median(axis=1)  # of those that were measured
+        near_m = pd.DataFrame(windows_m.reshape(len(u), -1)).median(axis=1)  # over measured pixels
         is_hidden = near_m < points_m[here, 2] - margins_m[here]
         occlusions[here] = np.select([near_m.isna(), is_hidden], ["no depth", "hidden"], "clear")
     distances_m = np.linalg.norm(points_m, axis=1)

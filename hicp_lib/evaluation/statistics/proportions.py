@@ -177,7 +177,7 @@ def variance_components(values: ArrayLike, subjects: ArrayLike) -> tuple[float, 
         return np.nan, np.nan
     within = (of["var"].fillna(0) * (of["size"] - 1)).sum() / (n - k)
     between = (of["size"] * (of["mean"] - table["value"].mean()) ** 2).sum() / (k - 1)
-    frames = (n - (of["size"] ** 2).sum() / n) / (k - 1)  # of each, if all have as many
+    frames = (n - (of["size"] ** 2).sum() / n) / (k - 1)  # frames per subject, if all have the same number
     return max((between - within) / frames, 0.0), within
 
 

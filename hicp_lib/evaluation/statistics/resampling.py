@@ -179,7 +179,7 @@ def weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return np.where(total > 0, (lower + upper) / 2, np.nan)
 
 
-_LEAST_BLOCKS = 4  # a recording is made of
+_LEAST_BLOCKS = 4  # minimum number of blocks in a recording
 _MAX_CORRELATION = 0.999
 
 

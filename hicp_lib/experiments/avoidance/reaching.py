@@ -43,19 +43,19 @@ REACTION_S = 0.2
 """Visual reaction time of the person (150 to 200 ms to a target that jumps)."""
 
 _DEG = lab.MOVEMENTS["reaching_deg"]
-_LEANS_DEG = np.arange(0.0, 100.1, 5.0)  # how far the trunk bends in all; the neck no further
+_LEANS_DEG = np.arange(0.0, 100.1, 5.0)  # total bend of the trunk; the neck does not follow
 _FINE_DEG = np.arange(0.0, 100.1, 0.25)
-_LEAN_SHARES = {lab.PELVIS_LEAN: 0.35, "spine_flexion": 0.65, "neck_flexion": -0.45}  # the eyes look ahead
-_FROM = np.array([-0.66, 0.55, 0.45])  # whence the hand comes, root frame: from the palm's side
-_WRISTS_M = np.arange(0.70, 0.04, -0.03)  # how far the wrist is from the robot's palm, tried from afar
-_PASSES_M = np.arange(1.5, 0.4, -0.05)  # how far off somebody passes, likewise
-_PASSES_X_M = (-0.9, 0.1, 0.9)  # from where to where
-_N_HALVINGS = 6  # of the step in which contact comes about
-_READY_M = 0.24  # how far from the end of the approach the person gets ready
-_HEAD_FROM_DEG = 20.0  # how much more upright the trunk is when the head gets ready
-_STRETCHED = 0.97  # of the arm's length: the trunk bends so far that this suffices
-_REST_M = np.array([0.16, 0.19, 0.08])  # a sitting person's wrist before, beside and above the pelvis
-_SEAT_M = 0.11  # how far below the pelvis's origin a seat is
+_LEAN_SHARES = {lab.PELVIS_LEAN: 0.35, "spine_flexion": 0.65, "neck_flexion": -0.45}  # the head stays upright
+_FROM = np.array([-0.66, 0.55, 0.45])  # direction of the approaching hand, root frame: from the palm's side
+_WRISTS_M = np.arange(0.70, 0.04, -0.03)  # distances of the wrist from the palm, from far to near
+_PASSES_M = np.arange(1.5, 0.4, -0.05)  # distances of a passer-by, likewise
+_PASSES_X_M = (-0.9, 0.1, 0.9)  # start, middle and end
+_N_HALVINGS = 6  # of the step that contains the contact
+_READY_M = 0.24  # distance of the ready posture from the end of the approach
+_HEAD_FROM_DEG = 20.0  # how much more upright the trunk is in the head's ready posture
+_STRETCHED = 0.97  # usable fraction of the arm's length; the trunk bends for the rest
+_REST_M = np.array([0.16, 0.19, 0.08])  # a sitting person's wrist in front of, beside and above the pelvis
+_SEAT_M = 0.11  # height of the pelvis's origin above the seat
 # Where elbows go, see `reach`: with the hands in the lap, and of the arm that reaches.
 _ELBOW_AT_REST, _ELBOW_REACHING = (-0.5, 0.7, -0.5), (-0.2, 0.5, -0.9)
 Reach = Callable[[np.ndarray], Posture]
@@ -223,7 +223,7 @@ def _by_head(shape: str, rest: Posture) -> tuple[Posture, Posture, Reach]:
     near_deg = _contact(_LEANS_DEG, lambda lean_deg: _distance_m(shape, _leaning(rest, lean_deg)))
     bodies = [lab.posed(shape, _leaning(rest, lean_deg)) for lean_deg in _LEANS_DEG]
     skin_m = lab.in_root(lab.posed(shape, _leaning(rest, near_deg)).vertices_m)
-    first = int(np.linalg.norm(skin_m - HOME_M["left"], axis=1).argmin())  # what would touch the hand
+    first = int(np.linalg.norm(skin_m - HOME_M["left"], axis=1).argmin())  # touches the hand first
     coarse_m = lab.in_root(np.array([body.vertices_m[first] for body in bodies]))
     way_m = np.stack([np.interp(_FINE_DEG, _LEANS_DEG, column) for column in coarse_m.T], axis=1)
     to_hand_m = np.array(HOME_M["left"]) - way_m[np.abs(_FINE_DEG - near_deg).argmin()]

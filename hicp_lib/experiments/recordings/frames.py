@@ -60,7 +60,7 @@ def camera_poses(plan: Scenario, n: int) -> np.ndarray:
     return load_icub().T_root_camera(plan.head_rad(n), plan.mount)
 
 
-PARTS_DIR = ".frames"  # truth of finished frames, and what they were made with
+PARTS_DIR = ".frames"  # ground truth of finished frames, and their settings
 MOCAP_PART = "mocap.json"
 DEPTH_UNITS_PER_M = 1000.0
 START_S = 100.0  # the camera's clock at the first frame: clocks rarely start together

@@ -30,9 +30,9 @@ _LEGS = ("hip_flexion", "hip_abduction", "hip_rotation", "knee_flexion", "ankle_
 _HANDS, _HALF_FINGER_M = {"left": LEFT_HAND, "right": RIGHT_HAND}, 0.02
 _DEG = MOVEMENTS["gestures_deg"]
 _ASIDE_M = ((0.5, DISTANCE_M), (0.8, DISTANCE_M + 0.2))  # half out of the image; two corners, (x, y)
-_CLOSE_M = ((-0.15, 0.75), (0.15, 1.05))  # torso and arms are in it
+_CLOSE_M = ((-0.15, 0.75), (0.15, 1.05))  # torso and arms are in this rectangle
 _STEP_M = 0.5  # the longest
-_PENETRATION_M = 0.03  # skin and clothes give way this far on the way from one posture to the next
+_PENETRATION_M = 0.03  # allowed penetration of skin and clothes between two postures
 _N_TRIES = 12
 
 

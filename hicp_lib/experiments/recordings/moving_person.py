@@ -28,7 +28,7 @@ HEAD_RAD = np.radians([0.0, 0.0, 0.0, 9.0, 0.0, 0.0])
 """Pose of the robot's head: slightly up, so that the person is visible from the thighs to the hair."""
 
 _AT_TABLE = 0.5  # fraction of the people; the others can step close
-_LEAD_S = (0.3, 0.9)  # how long before the first frame motion capture starts; as long after the last it ends
+_LEAD_S = (0.3, 0.9)  # lead of motion capture before the first frame, and lag after the last
 _BALL_M = 0.006  # radius of a marker
 
 

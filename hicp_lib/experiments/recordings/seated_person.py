@@ -21,13 +21,13 @@ VIEWS = {"upper": "level", "lower": "tilted"}
 DISTANCE_M = 1.15  # of the person's pelvis from the robot's root, along the floor
 _PLACE_M = (0.0, DISTANCE_M)
 TABLE_HEIGHT_M = 0.72
-_TABLE_EDGE_M = 0.20  # the table's edge before the pelvis
+_TABLE_EDGE_M = 0.20  # the table's edge in front of the pelvis
 _TABLE_DEPTH_M = 0.55
-_WRISTS_M = {"left": (0.40, 0.12), "right": (0.36, -0.18)}  # before the pelvis, to the person's left
-_WRISTS_APART_M = 0.05  # at most, a person's from these in either direction
-_POSTURE_SD_DEG = 4.0  # of how people hold spine and neck
+_WRISTS_M = {"left": (0.40, 0.12), "right": (0.36, -0.18)}  # in front of the pelvis, to the person's left
+_WRISTS_APART_M = 0.05  # maximum deviation of a person's wrists from these
+_POSTURE_SD_DEG = 4.0  # of the spine and neck angles between people
 _DEG = MOVEMENTS["seated_deg"]
-_CONTACT_M = 0.003  # between the lowest point of hand or forearm and the table
+_CONTACT_M = 0.003  # gap between the lowest point of hand or forearm and the table
 _N_ROUNDS = 6
 
 

@@ -123,7 +123,7 @@ def _capture_all(out: Path, name: str, subject: Subject, n: int) -> None:
     T_world_camera = T_WORLD_ROOT @ camera_poses(plan, 1)[0]
     exported, T_mocap_world, lead_s = plan.capture(subject, float(plan.times_s(n)[-1]), T_world_camera)
     write_tsv(tsv, exported)
-    if len(exported.times_s) < MAX_C3D_FRAMES:  # a longer one is in the TSV file alone
+    if len(exported.times_s) < MAX_C3D_FRAMES:  # a longer one is only in the TSV file
         write_c3d(c3d, exported)
     T_base_mocap = np.linalg.inv(T_mocap_world @ T_WORLD_ROOT).tolist()
     known = {"n_frames": n, "T_base_mocap": T_base_mocap, "mocap_offset_s": frames.START_S - lead_s}

@@ -25,8 +25,8 @@ from hicp_lib.formats.importers.results import ALPHAPOSE, COCO, DETECTRON2, read
 from hicp_lib.formats.importers.scores import score_scale
 from hicp_lib.formats.units import refuse_fractions
 
-_LEAST_IMAGES = 5  # that say whether coordinates are those of another size
-_OFF, _ALIKE = np.log(1.25), 0.1  # what is another size, and the same; of ratios' logarithms
+_LEAST_IMAGES = 5  # needed to decide whether coordinates are of another size
+_OFF, _ALIKE = np.log(1.25), 0.1  # logarithms of ratios: another size, and equal in both directions
 READERS: dict[str, Callable[[Path], People]] = {
     "openpose": read_openpose,
     "alphapose": lambda path: read_results(path, ALPHAPOSE),

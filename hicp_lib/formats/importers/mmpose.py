@@ -65,7 +65,7 @@ def read_mmpose(path: Path) -> People:
     means = np.where(counted, scores, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
     return People(
         path, "stem", list[str | int](named), source_of, keypoints, scores,
-        rows.numbers("bbox_score", default=1.0) * means,  # 1 where a bottom-up model gave no box
+        rows.numbers("bbox_score", default=1.0) * means,  # 1 if a bottom-up model gave no box
         conventions, _extras(rows),
     )  # fmt: skip
 

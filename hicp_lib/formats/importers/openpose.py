@@ -9,7 +9,7 @@
 - OpenPose itself adds half a pixel to the body's peaks, not to those of face and hands; it is subtracted, so
   that pixel centres are at integers. A file with a text as `version`, as from AlphaPose, is not OpenPose's.
 - No score of the person is written (OpenPose's own averages parts and limbs, and limbs are not in the
-  file). Here it is the sum of the body parts' confidences over the number of parts, absent ones 0;
+  file). Here it is the sum fraction of the body parts' confidences over the number of parts, absent ones 0;
   without a body, the mean confidence of the keypoints found.
 
 Source: OpenPose's output documentation.
@@ -39,7 +39,7 @@ _PARTS = {
 }
 _RUN_AGAIN = "run OpenPose with --keypoint_scale 0 (source pixels)"
 _PADDING = 0.05  # of an image's side: padding to the network's input may leave a few just beyond the edge
-_MOST_OUTSIDE = 0.1  # of the body parts
+_MOST_OUTSIDE = 0.1  # fraction of the body parts
 
 
 def read_openpose(path: Path) -> People:
@@ -132,7 +132,7 @@ def refuse_other_size(path: Path, keypoints_px: np.ndarray, sizes_px: np.ndarray
     Raises
     ------
     InputError
-        If more than a tenth of the body parts lie outside.
+        If more than a tenth fraction of the body parts lie outside.
     """
     body = keypoints_px[:, BODY]
     given = np.isfinite(body).all(axis=-1)

@@ -268,7 +268,7 @@ def skirt(posed: PosedBody, hip_rotation: np.ndarray, length_m: float, flare: fl
     legs = (body.field("leg") > 0) | body.in_regions("hips")
     legs |= body.in_regions("torso") & (body.field("torso") < 0.22) & (body.field("arm") == 0)
     hips = posed.keypoints_m[INDEX["mid_hip"]]
-    points = (posed.vertices_m[legs] - hips) @ hip_rotation  # x forward, y left, z up, whatever the pose
+    points = (posed.vertices_m[legs] - hips) @ hip_rotation  # x forward, y left, z up, in every pose
     n_angles, n_rows = 72, 16
     angle = np.linspace(0, 2 * np.pi, n_angles, endpoint=False)
     ray = np.stack([np.cos(angle), np.sin(angle)])

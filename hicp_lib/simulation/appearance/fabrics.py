@@ -19,7 +19,7 @@ the front."""
 
 _PANEL_ENDS = (("mid_hip", "neck"), ("left_shoulder", "left_wrist"), ("right_shoulder", "right_wrist"),
                ("left_hip", "left_ankle"), ("right_hip", "right_ankle"))  # fmt: skip
-_PANEL_RADII_M = np.array([0.15, 0.06, 0.06, 0.085, 0.085], np.float32)  # how thick limbs are taken to be
+_PANEL_RADII_M = np.array([0.15, 0.06, 0.06, 0.085, 0.085], np.float32)  # assumed radii of limbs
 
 
 def make_panels(landmarks_m: np.ndarray) -> Panels:
@@ -103,7 +103,7 @@ class Fabric:
 def random_fabric(rng: Rng, plain: float) -> Fabric:
     """Cloth for shirts; `plain` is the chance of a single colour."""
     colours = np.array([any_colour(rng) for _ in range(3)])
-    if rng.random() < 0.3:  # white, black and grey are what people wear
+    if rng.random() < 0.3:  # people mostly wear white, black and grey
         colours[0] = linear(np.full(3, rng.choice([0.93, 0.06, 0.15, 0.55])))
     return Fabric(
         colours,

@@ -45,7 +45,7 @@ class Obstacles:
 _GRID = (36, 72)
 _CELL_M = 0.02
 _CLOTH_M = 0.018
-_FAR_M = 9.0  # where a column holds no trunk
+_FAR_M = 9.0  # for a column without trunk
 
 
 def obstacles(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> Obstacles:

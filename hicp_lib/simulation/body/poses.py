@@ -18,8 +18,8 @@ from hicp_lib.simulation.body.model import Body, Pose, Shape
 from hicp_lib.simulation.body.self_collision import collision_model, self_collision_distance_m
 
 _N_TRIES = 30
-_ROOM_STEP_M = 0.006  # arms keep this much further from the body with every try
-_PENETRATION_M = 0.02  # skin and clothes give way this far
+_ROOM_STEP_M = 0.006  # added to the arms' distance from the body with every try
+_PENETRATION_M = 0.02  # allowed penetration of skin and clothes
 
 _RANGES_DEG = PEOPLE["poses_deg"]
 

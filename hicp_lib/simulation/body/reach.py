@@ -11,7 +11,7 @@ from hicp_lib.simulation.body.model import Body, Shape, pose_bones
 _SHOULDER = ("shoulder_flexion", "shoulder_abduction", "shoulder_rotation")
 _N_SWIVELS = 36
 _N_ROUNDS = 3  # the shoulder moves a little with the arm, so the solution is repeated
-_LONGEST = 0.998  # of the stretched arm
+_LONGEST = 0.998  # usable fraction of the stretched arm
 
 
 def reach(

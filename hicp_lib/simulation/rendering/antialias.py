@@ -66,7 +66,7 @@ def smooth_edges(
     if len(edges) == 0:
         return image
     row, column = np.divmod(edges, image.shape[1])
-    wide = 2 * image.shape[1] + 1  # row by row, borders are numbered together with what lies between them
+    wide = 2 * image.shape[1] + 1  # row by row, pixels and the borders between them are numbered together
     middle = (2 * row + 1) * wide + 2 * column + 1
     borders, around = np.unique([middle - 1, middle + 1, middle - wide, middle + wide], return_inverse=True)
     shown = _alike(borders, trace, scene, camera)

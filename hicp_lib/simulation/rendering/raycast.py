@@ -16,7 +16,7 @@ from hicp_lib.simulation.rendering.surfaces import Surface
 with with_variables(OPEN3D_DISABLE_WEB_VISUALIZER="true"):
     import open3d as o3d
 
-DEPTH_STEP = 0.03  # neighbours whose depths differ by a larger share lie on different surfaces
+DEPTH_STEP = 0.03  # relative difference in depth beyond which neighbours are on different surfaces
 N_THREADS = 1  # frames are rendered in parallel by processes; one scene takes calls from one thread only
 
 

@@ -10,7 +10,7 @@ from hicp_lib.simulation.rendering.raycast import RayScene, dot, pick
 from hicp_lib.simulation.rendering.surfaces import column
 
 AMBIENT_REACH_M = 0.7
-_OFF_SURFACE_M = 0.003  # where rays begin
+_OFF_SURFACE_M = 0.003  # start of rays
 
 
 def visibility(

@@ -15,9 +15,9 @@ import numpy as np
 from hicp_lib.simulation.sensors.depth_camera import DepthCamera, Rng
 from hicp_lib.simulation.sensors.depth_noise import correlated_noise, patches
 
-_STEP_PX = 1.0  # neighbours whose disparities differ by more lie on different surfaces
-_EDGE_JITTER = 0.12  # how far texture moves the edges of matching, as a share of the window
-_EDGE_GROWTH = 0.06  # and how far near surfaces, which stand out, spread over far ones
+_STEP_PX = 1.0  # difference beyond which neighbours are on different surfaces
+_EDGE_JITTER = 0.12  # shift of matched edges by texture, as a fraction of the window
+_EDGE_GROWTH = 0.06  # and growth of near surfaces over far ones
 
 
 @dataclass(frozen=True, kw_only=True)

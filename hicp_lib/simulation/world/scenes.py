@@ -32,7 +32,7 @@ from hicp_lib.simulation.world.visibility import keypoint_visibility
 MAX_SCENES = 1_000_000
 _MAX_NUMBER = 1_000_000_000  # of seeds
 Staged = Callable[[Rng, str], Stage]
-_PARTS_DIR = ".scenes"  # the people of finished images, and what they were made with
+_PARTS_DIR = ".scenes"  # the people of finished images, and their settings
 
 
 def render_dataset(
@@ -131,7 +131,7 @@ def render_scene(
         stage = staged(rng, split)
         frame = render(stage.world, stage.camera, rng)
         people = annotate(stage, frame)
-        if people:  # somebody is in the picture
+        if people:  # someone is visible
             return expose(frame.radiance, stage.sensor, rng, frame.person >= 0), people
 
 

@@ -27,8 +27,8 @@ UNDECIDED = "undecided"
 PARTLY = "partly tested"
 NOT_TESTABLE = "not testable here"
 VERDICTS = (REPRODUCED, ON_RENDERED_DATA, NOT_REPRODUCED, UNDECIDED, PARTLY, NOT_TESTABLE)
-EVERY_NEEDS = 3  # detectors, to speak of every one
-SHOWN = 6  # numbers of the evidence, those that decide
+EVERY_NEEDS = 3  # minimum number of detectors for "every"
+SHOWN = 6  # maximum number of values shown as evidence
 
 _SURE = NormalDist().inv_cdf(0.975)
 
