@@ -47,6 +47,10 @@ _keypoint_map_option = click.option(
 
 def main() -> NoReturn:
     """Run the command line and exit."""
+    for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:  # closed by the caller: the next file opened would take its place
+            os.dup2(os.open(os.devnull, os.O_RDWR), descriptor)
+            setattr(sys, name, open(descriptor, "w" if descriptor else "r"))
     # Damaged input is reported in one line by us: discard the messages of C libraries.
     sys.stderr = os.fdopen(os.dup(2), "w", 1, sys.stderr.encoding, "backslashreplace")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)

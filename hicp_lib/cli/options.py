@@ -1,5 +1,6 @@
 """Shared options of the `hicp` command's parts."""
 
+import errno
 import math
 from collections.abc import Callable, Sequence
 from functools import wraps
@@ -19,6 +20,11 @@ class _Path(click.Path):
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Path:
         path = Path(str(super().convert(value, param, ctx)))
+        try:
+            path.stat()
+        except (OSError, ValueError) as error:  # most are told by who opens it, or are names to be written
+            if getattr(error, "errno", None) == errno.ELOOP:
+                raise InputError(f"{path}: leads to itself, as a link or through one; give another") from None
         paths = {name: of for name, of in (ctx.params | {param.name: path}).items() if isinstance(of, Path)}
         out, given = paths.pop("out", None), [*paths.values()]
         read = given + [of / name for of in given for name in _READ_OF_FOLDERS]

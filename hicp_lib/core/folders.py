@@ -100,7 +100,8 @@ def locked_folder(folder: str | Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
         raise InputError(f"{folder}: is a file, or lies in one; give a folder") from None
-    with held(folder, waits=folder.resolve().is_relative_to(cache_dir().resolve())) as is_ours:
+    real, cache = (Path(os.path.realpath(of)) for of in (folder, cache_dir()))
+    with held(folder, waits=real.is_relative_to(cache)) as is_ours:
         if is_ours is False:
             raise InputError(f"{folder}: another command writes there; wait for it to end")
         remove_left(folder, below=True)

@@ -83,8 +83,11 @@ def limited_parts(
 
     Parameters
     ----------
-    path, function, *arguments, least_s
-        As of `limited_child`; what the function yields are bytes.
+    path : Path
+    function : callable
+        A generator of bytes, else as of `limited_child`, like all else.
+    *arguments : object
+    least_s : float, optional
 
     Yields
     ------

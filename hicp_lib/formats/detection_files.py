@@ -9,6 +9,7 @@ The bytes depend on the detections and their order only.
 """
 
 import json
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -75,7 +76,7 @@ def open_detections(path: str | Path) -> Iterator[_Append]:
         As `refuse_other_suffix`.
     """
     refuse_other_suffix(path)
-    remove_left(Path(path).resolve().parent)
+    remove_left(Path(os.path.realpath(path)).parent)
     is_json = Path(path).suffix == ".json"
     with atomic_path(path) as temporary, json_list(temporary) if is_json else _table(temporary) as append:
         yield lambda image_id, facts, found, extras=None: append(

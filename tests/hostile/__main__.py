@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 from hicp_lib.detectors.weights.default import weights_dir
@@ -26,15 +27,15 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
     if asked.mutated is None:
-        beginnings = tuple(asked.wanted) or ("",)
-        cases = [case for name, case in corpus().items() if name.startswith(beginnings)]
+        named = corpus().items()
+        cases = [case for of in asked.wanted or ("",) for name, case in named if name.startswith(of)]
         cases = cases[:: asked.every]
     else:
         kinds = tuple(asked.wanted) or tuple(mutated.COMMANDS)
         cases = list(mutated.cases(asked.mutated, asked.seed, kinds))
     n, fell, refused = Counter[str](), Counter[str](), Counter[str]()
     cpu_s, start_s = 0.0, time.monotonic()
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, suppress(KeyboardInterrupt):  # a table of what was done
         judge = Judge(Path(folder), weights_dir())
         for case in cases:
             told = judge.faults(case)
@@ -49,7 +50,7 @@ def main() -> int:
         right = of - refused[kind] - fell[kind]
         print(f"{kind:<20} {of:>4} cases: {refused[kind]:>4} refused, {right:>4} right, {fell[kind]:>3} fell")
     took = f"{cpu_s:.0f} s of a processor, {time.monotonic() - start_s:.0f} s in all"
-    print(f"{len(cases)} cases, {refused.total()} refused, {fell.total()} fell; {took}")
+    print(f"{n.total()} of {len(cases)} cases, {refused.total()} refused, {fell.total()} fell; {took}")
     return bool(fell)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from hicp_lib.datasets.subsets import create_hicp
 from tests.hostile.case import FULL_DISK, Case
 from tests.hostile.good import CREATE, DETECT, DRAW, EVALUATE, FIT, IMPORT, LIFT
-from tests.hostile.special_files import listening
+from tests.hostile.special_files import circle, listening
 
 # Commands that write one file, TARGET.
 WRITERS = {
@@ -58,7 +58,7 @@ def link_to_nothing(path: Path) -> None:
 
 TARGETS: dict[str, Callable[[Path], None]] = {
     "a pipe": lambda path: os.mkfifo(path), "a device": device, "a socket": listening, "read-only": read_only,
-    "a folder": folder_of_mine, "a link to nothing": link_to_nothing,
+    "a folder": folder_of_mine, "a link to nothing": link_to_nothing, "a circle of links": circle,
 }  # fmt: skip
 
 
@@ -131,7 +131,7 @@ def cases() -> Iterator[Case]:
             full = command.replace("TARGET", f"{FULL_DISK}/x")
             yield Case(f"destroying: {writer}: onto a full disk", full, _full_disk, notes=True, exits=(0, 2))
     for filler, command in FILLERS.items():
-        for kind in ("a pipe", "a device", "a socket", "read-only", "a link to nothing"):
+        for kind in ("a pipe", "a device", "a socket", "read-only", "a link to nothing", "a circle of links"):
             made = partial(_target, "target", TARGETS[kind])
             yield Case(
                 f"destroying: {filler}: into {kind}", command.replace("TARGET", "target"), made, notes=True
@@ -154,6 +154,10 @@ def cases() -> Iterator[Case]:
                     FILLERS[filler].replace("TARGET", places),
                     notes=True,
                 )
+    report = "report --profile quick --results TARGET"
+    for command in (report, *(FILLERS[filler] + "/below" for filler in ("create", "import bag", "draw PNG"))):
+        made = partial(_target, "target", circle)
+        yield Case(f"destroying: circle: {command}", command.replace("TARGET", "target"), made, notes=True)
     create = "dataset create --annotations out/annotations.json --images out/pictures --out out"
     yield Case("destroying: create: inputs within", create, _inputs_within, exits=(0, 2),
                check=_mine_stays("out/annotations.json", "out/pictures/a.png"))  # fmt: skip

@@ -13,6 +13,7 @@ import shutil
 import sys
 import tempfile
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 from hicp_lib.detectors.weights.default import weights_dir
@@ -119,7 +120,7 @@ def main() -> int:
     asked = parser.parse_args()
     shares = {kind: COMMANDS[kind][1] for kind in asked.kinds}
     moments, n, fell = random.Random(asked.seed), Counter[str](), Counter[str]()
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory() as name, suppress(KeyboardInterrupt):  # a table of what was done
         ready = Ready(Path(name), {})
         for kind, share in shares.items():
             killing = Killing(Path(name), kind, ready)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 from tests.hostile.case import Case
 from tests.hostile.good import CREATE, DETECT, DRAW, EVALUATE, FIT, IMPORT, IMPORT_OPEN3D, LIFT, MMPOSE
@@ -86,10 +87,34 @@ PLACES = {"nowhere": "", "of 5,000 characters": "a" * 5000 + ".json", "below a f
 PARAMETERS = {"detectors": ("", "[]", "nonsense", '["mediapipe", 7]', "NaN", "mediapipe,mediapipe"),
               "seed": ("nan", "inf", "-1", "1.5", "", "text", "1e300"),
               "n_images": ("0", "-1", "nan", "1e9", "inf", "", "1.5")}  # fmt: skip
+# Of the environment, and what is right with them beside a refusal.
+VARIABLES = {
+    "HICP_CACHE": ("", "/dev/null", "results.json", "/proc/x", "circle", "out\nb", "out" * 100),
+    "HICP_LIMITS": ("", "nan", "inf", "-1", "0", "1e999", "x", "9" * 5000),
+    "HICP_DASK": ("", "nonsense", "tcp://127.0.0.1:9", "/dev/zero"),
+    "TMPDIR": ("", "/nowhere", "/dev/null", "circle"),
+}
+UNDER_VARIABLES = {
+    "detect": f"{DETECT} --out out.json", "import": "record import out --bag x.bag", "models": "models list",
+    "draw": f"{DRAW} --out out", "create": f"{CREATE} --out out",
+}  # fmt: skip
 PROVIDERS = ("CPU", "cpu2", "../x", "", "CPUExecutionProvider", "nan", "/dev/zero", "<svg onload=x()>")
 
 
+def _circle(folder: Path) -> None:
+    (folder / "circle").symlink_to("circle")
+
+
 def cases() -> Iterator[Case]:
+    for variable, values in VARIABLES.items():
+        for value in values:
+            shown = value if len(value) < 20 else f"{len(value)} characters"
+            for name, command in UNDER_VARIABLES.items():
+                told = {"exits": (0, 2), "notes": True, "fresh": variable == "TMPDIR"}
+                yield Case(
+                    f"variable: {variable}={shown!r}: {name}", command, _circle,
+                    environment=((variable, value),), **told,
+                )  # fmt: skip
     for detector, option, right in OF_DETECTORS:
         allowed = (*right, *(["null"] if option in NULL_IS_DEFAULT else []))
         for number in (*NUMBERS, *MORE.get(option, ())):
