@@ -52,11 +52,8 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
     rows = table[np.isclose(table["threshold_m"], middle_m)]
     means = rows.groupby(["detector", "view", "method"], sort=False)["value"].mean()
     distances = [f"{100 * distance_m:g}" for distance_m in marked_m]
-    told = {
-        "reference": TEXTS["references"][table["reference"].iloc[0]],
-        "distances": distances,
-        "said": means,
-    }
+    reference = TEXTS["references"][table["reference"].iloc[0]]
+    told = {"reference": reference, "distances": distances, "said": means}
     told |= {"nearest_cm": 100 * middle_m, "ends": means.iloc[[means.argmax(), means.argmin()]]}
     return Figure(figure, *texts("within_curves", **told, note=note), table)
 
