@@ -144,6 +144,8 @@ def wide(
         Order of the new columns; by default that of occurrence.
     """
     index = list(index)
+    if rows.empty:
+        return rows[index]
     table = rows.assign(text=bounds_of(rows) if text is None else text)
     table = table.pivot(index=index, columns=columns, values="text")
     table = table[[name for name in order or dict.fromkeys(rows[columns]) if name in table]]

@@ -68,6 +68,11 @@ def test_a_wide_table_shows_bounds_if_nothing_else_is_said():
     assert wide(table, ["case"], "metric").iloc[0].tolist() == ["a", "0.50 [0.40, 0.60]", "–"]
 
 
+def test_a_wide_table_of_nothing_has_the_columns_that_name_its_rows():
+    nothing = pd.DataFrame({"case": [], "metric": [], "value": [], "low": [], "high": []})
+    assert list(wide(nothing, ["case"], "metric")) == ["case"]
+
+
 def test_what_is_not_there_is_said():
     assert not_available("truth.parquet").iloc[0].tolist() == [
         "truth.parquet",

@@ -95,10 +95,10 @@ def separation_terms(separations: Mapping[str, Separation], note: str) -> Figure
     """The terms of the protective separation distance and their sum: a row each, a dot per detector."""
     table = separation_table(separations)
     rows = table.melt("term", var_name="detector", value_name="value")
-    rows = rows.assign(low=rows["value"], high=rows["value"])
     figure, axis = new_figure(1, 1, COLUMN_IN, 1.4 + 0.36 * len(table))
     pens, terms = marks.detector_dots(separations), list(table["term"])
-    marks.dots_in_rows(axis, rows, "term", "detector", terms, pens, factor=100, ms=6, capsize=0)
+    bare = {"bounds": ("value",) * 3, "factor": 100, "ms": 6, "capsize": 0}
+    marks.dots_in_rows(axis, rows, "term", "detector", terms, pens, **bare)
     marks.name_rows(axis, terms)
     axis.axhline(len(terms) - 1.5, color="#AAAAAA", lw=0.8)
     axis.axvline(100 * FIELD_M, color="#111111", lw=1, ls=":")

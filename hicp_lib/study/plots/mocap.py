@@ -50,7 +50,7 @@ def joint_medians(medians: pd.DataFrame, paper: pd.DataFrame, min_score: float, 
     for axis, rows, joint in panels:
         for (detector, method), dot in rows.groupby(["detector", "method"], sort=False):
             (pen,) = marks.detector_dots([detector.removesuffix(_OF_PAPER)]).values()
-            pen |= {"label": None, "ms": 6} | ({} if method == "paper" else {"mfc": "white"})
+            pen |= {"label": None, "ms": 6} | ({} if method == "paper" else {"mfc": "white", "alpha": 0.6})
             marks.dots(axis, dot, names.index(detector), _BOUNDS, 100, **pen)
             if (detector, method) == (PERFECT, "paper"):
                 axis.axvline(100 * dot["median_m"].iloc[0], color=TRUTH_COLOUR, lw=0.8, ls=":")
@@ -188,7 +188,7 @@ def registration(
         What the data are, for the caption.
     """
     frames, methods = sorted(set(clicks["frame"])), list(table["method"])
-    figure, axes = new_figure(2, len(frames), COLUMN_IN, 5.6, squeeze=False, height_ratios=(1.3, 1))
+    figure, axes = new_figure(2, len(frames), COLUMN_IN, 5.6, squeeze=False, height_ratios=(1.6, 1))
     for axis in axes[1]:
         axis.remove()
     bars = figure.add_subplot(axes[1, 0].get_gridspec()[1, :])
@@ -219,8 +219,10 @@ def _draw_markers(axis, recording: Recording, frame: int, clicks, pixels: pd.Dat
 
 
 def _draw_bars(axis, values_mm: pd.Series, label: str) -> None:
-    colours = [colour for colour, _ in _STYLES[: len(values_mm)]]
-    axis.barh(range(len(colours)), values_mm.iloc[: len(colours)], color=colours, height=0.55)
-    marks.name_rows(axis, [name.replace(": ", ":\n") for name in values_mm.index])
-    axis.set(xlabel=label)
-    axis.grid(axis="y", visible=False)
+    """Bars that end in the marks the pictures have."""
+    for y, (value_mm, (colour, shape)) in enumerate(zip(values_mm, _STYLES, strict=False)):
+        axis.barh(y, value_mm, color=colour, height=0.15)
+        axis.plot(value_mm, y, shape, color=colour, mew=1.8, markersize=9)
+        axis.annotate(f"{value_mm:.0f}", (value_mm, y), (9, 0), textcoords="offset points", va="center")
+    axis.set(xlabel=label, yticks=[], ylim=(len(values_mm) - 0.5, -0.5))
+    axis.margins(x=0.1)

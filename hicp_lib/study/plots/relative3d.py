@@ -129,13 +129,12 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
     figure, axes, panels = marks.panels(rows, ["joint"], *size, wrap=2, sharex=True, sharey=True)
     for axis, of_joint, joint in panels:
         for (detector, view), dots in of_joint.groupby(["detector", "view"], sort=False):
-            (x, xerr), (y, yerr) = (
-                (100 * dots[name], 100 * marks.whiskers(dots, name, f"{name}_low", f"{name}_high"))
-                for name in ("spread_m", "bias_m")
-            )
+            names = ((name, f"{name}_low", f"{name}_high") for name in ("spread_m", "bias_m"))
+            xerr, yerr = (100 * marks.whiskers(dots, *bounds) for bounds in names)
             pen = marks.detector_dots([detector])[detector] | {"label": f"{detector}, {view}"}
             pen |= {"mfc": "white"} if views.index(view) else {}
-            axis.errorbar(x, y, xerr=xerr, yerr=yerr, ms=6.5, elinewidth=0.7, **pen)
+            pen |= {"xerr": xerr, "yerr": yerr, "ms": 6.5, "elinewidth": 0.7}
+            axis.errorbar(100 * dots["spread_m"], 100 * dots["bias_m"], **pen)
         axis.set(xscale="log", yscale="log", title=joint, xlabel=_SPREAD, ylabel=_BIAS)
         for scale in (axis.xaxis, axis.yaxis):  # plain numbers
             scale.set_major_locator(LogLocator(subs=(1, 2, 5)))

@@ -51,14 +51,11 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
     middle_m = marked_m[len(marked_m) // 2]
     rows = table[np.isclose(table["threshold_m"], middle_m)]
     means = rows.groupby(["detector", "view", "method"], sort=False)["value"].mean()
-    said = {
-        "reference": TEXTS["references"][table["reference"].iloc[0]],
-        "distances": [f"{100 * distance_m:g}" for distance_m in marked_m],
-        "nearest_cm": 100 * middle_m,
-        "said": means,
-        "ends": means.iloc[[means.argmax(), means.argmin()]],
-    }
-    return Figure(figure, *texts("within_curves", **said, note=note), table)
+    distances = [f"{100 * distance_m:g}" for distance_m in marked_m]
+    reference = TEXTS["references"][table["reference"].iloc[0]]
+    told = {"reference": reference, "distances": distances, "said": means}
+    told |= {"nearest_cm": 100 * middle_m, "ends": means.iloc[[means.argmax(), means.argmin()]]}
+    return Figure(figure, *texts("within_curves", **told, note=note), table)
 
 
 @in_style
