@@ -89,6 +89,7 @@ def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
             _draw_box(axis, row, part, colour)
         _draw_cut(axis, row)
         axis.set(xticks=[], yticks=[], xlim=(left - 0.5, right - 0.5), ylim=(bottom - 0.5, top - 0.5))
+        axis.spines[:].set_visible(False)
         axis.grid(False)
     whole, kept = (_areas_px2(table, f"{subset}_crop") for subset in ("basic", "headless"))
     sides = [f"{side} for {n}" for side, n in table["cut_side"].value_counts().items()]
