@@ -92,9 +92,9 @@ def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
         axis.spines[:].set_visible(False)
         axis.grid(False)
     whole, kept = (_areas_px2(table, f"{subset}_crop") for subset in ("basic", "headless"))
-    sides = [f"{side} for {n}" for side, n in table["cut_side"].value_counts().items()]
+    said = {"sides": list(table["cut_side"].astype(str).unique()), "n": len(table), "note": note}
     gone = {"least": (1 - kept / whole).min(), "most": (1 - kept / whole).max()}
-    return Figure(figure, *texts("head_cuts", note=note, n=len(table), sides=sides, **gone), table)
+    return Figure(figure, *texts("head_cuts", **said, **gone), table)
 
 
 def _areas_px2(table: pd.DataFrame, box: str) -> pd.Series:
