@@ -62,6 +62,7 @@ def class_examples(classes: pd.DataFrame, truth: Truth, folders: Mapping[str, Pa
 @in_style
 def class_precision(table: pd.DataFrame, note: str) -> Figure:
     """Average precision per class; `table` from `compare_classes`."""
+    table = table[table["metric"].isin(["AP", "AR"])]
     rows = table[table["metric"] == "AP"]
     rows = rows[(rows["group"] != "body") | rows.index.isin(marks.own_bodies(rows).index)]
     names, detectors = [name for name in CLASSES if name in set(rows["class"])], rows["detector"].unique()
