@@ -181,7 +181,7 @@ def crop_sizes(table: pd.DataFrame, min_pixels: int, note: str) -> Figure:
     axis.hist(sizes[sizes < min_pixels], bins, color="#BBBBBB", label="too small")
     axis.axvline(min_pixels, color="black", lw=1.2, ls="--")
     axis.set(xscale="log", xlabel="area of the crop [px]", ylabel="people")
-    ticks = [n * 10**k for k in range(8) for n in (1, 3) if bins[0] <= n * 10**k <= bins[-1]]
+    ticks = [n * 10**k for k in range(8) for n in (1, 2, 5) if bins[0] <= n * 10**k <= bins[-1]]
     axis.set_xticks(ticks, [f"{tick:,}" for tick in ticks])
     axis.minorticks_off()
     axis.yaxis.get_major_locator().set_params(integer=True)
