@@ -74,7 +74,7 @@ def test_a_table_is_saved_exactly_with_the_parameters_of_its_run(study, shown):
 def test_a_table_may_be_shown_in_short_and_is_saved_whole(study, shown):
     table = pd.DataFrame({"detector": ["a"], "value": [0.25], "low": [0.125]})
     study.table("t", table, "A table.", shown=pd.DataFrame({"detector": ["a"], "AP": ["0.25 [0.12, 0.5]"]}))
-    assert "0.25 [0.12, 0.5]" in shown[0] and ">low<" not in shown[0]
+    assert "0.25 &#91;0.12, 0.5&#93;" in shown[0] and ">low<" not in shown[0]
     pd.testing.assert_frame_equal(pd.read_parquet(study.folder / "t.parquet"), table)
 
 

@@ -24,9 +24,8 @@ def ingredients(table: pd.DataFrame, note: str) -> Figure:
         What the data are, for the caption.
     """
     variants, bodies = list(table["variant"].unique()), list(table["body"].unique())
-    height_in = 0.7 + (0.6 + 0.3 * len(variants)) * len(bodies)
-    shape = len(bodies), len(_MEASURES)
-    figure, axes = new_figure(*shape, WIDTH_IN, height_in, sharey=True, sharex="col", squeeze=False)
+    shape = len(bodies), len(_MEASURES), WIDTH_IN, 0.7 + (0.6 + 0.3 * len(variants)) * len(bodies)
+    figure, axes = new_figure(*shape, sharey=True, sharex="col", squeeze=False)
     pens = marks.subset_dots(table["subset"].unique())
     for row, body in zip(axes, bodies, strict=True):
         for axis, measure in zip(row, _MEASURES, strict=True):
@@ -73,9 +72,8 @@ def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, min_term: flo
     for axis in axes[-1]:
         axis.set(xlabel="score")
     marks.legend_below(figure, axes[0, 0])
-    said = errors.replace({"group": _GROUPS})
-    told = {"min_term": min_term, "fewest": _FEWEST, "note": note, "said": said}
-    return Figure(figure, *texts("reliability_curves", **told), curves)
+    told = {"min_term": min_term, "fewest": _FEWEST, "said": errors.replace({"group": _GROUPS})}
+    return Figure(figure, *texts("reliability_curves", note=note, **told), curves)
 
 
 def _draw_curves(axis, rows: pd.DataFrame, colour: str) -> None:

@@ -89,11 +89,12 @@ def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
             _draw_box(axis, row, part, colour)
         _draw_cut(axis, row)
         axis.set(xticks=[], yticks=[], xlim=(left - 0.5, right - 0.5), ylim=(bottom - 0.5, top - 0.5))
+        axis.spines[:].set_visible(False)
         axis.grid(False)
     whole, kept = (_areas_px2(table, f"{subset}_crop") for subset in ("basic", "headless"))
-    sides = [f"{side} for {n}" for side, n in table["cut_side"].value_counts().items()]
+    said = {"sides": list(table["cut_side"].astype(str).unique()), "n": len(table), "note": note}
     gone = {"least": (1 - kept / whole).min(), "most": (1 - kept / whole).max()}
-    return Figure(figure, *texts("head_cuts", note=note, n=len(table), sides=sides, **gone), table)
+    return Figure(figure, *texts("head_cuts", **said, **gone), table)
 
 
 def _areas_px2(table: pd.DataFrame, box: str) -> pd.Series:
@@ -180,7 +181,7 @@ def crop_sizes(table: pd.DataFrame, min_pixels: int, note: str) -> Figure:
     axis.hist(sizes[sizes < min_pixels], bins, color="#BBBBBB", label="too small")
     axis.axvline(min_pixels, color="black", lw=1.2, ls="--")
     axis.set(xscale="log", xlabel="area of the crop [px]", ylabel="people")
-    ticks = [n * 10**k for k in range(8) for n in (1, 3) if bins[0] <= n * 10**k <= bins[-1]]
+    ticks = [n * 10**k for k in range(8) for n in (1, 2, 5) if bins[0] <= n * 10**k <= bins[-1]]
     axis.set_xticks(ticks, [f"{tick:,}" for tick in ticks])
     axis.minorticks_off()
     axis.yaxis.get_major_locator().set_params(integer=True)

@@ -1,6 +1,7 @@
 """Figures of doses: what was varied, and how detection falls with it."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ _MEASURES = {"AP": "average precision", "visible keypoints hit": "share of visib
 
 @in_style
 def dose_pictures(
-    annotations: Annotations, folder: Path, found: Mapping[str, Mapping[int, Detections]], person: int = 0
+    annotations: Annotations, folder: Path, found: Mapping[str, Mapping[int, Detections]], person: int = 1
 ) -> Figure:
     """Pictures of one person with what was detected, a row for each dose, five levels of each.
 
@@ -36,18 +37,23 @@ def dose_pictures(
     found : mapping of str to mapping of int to Detections
         By image id, of every detector.
     person : int
+        The last, if there are fewer.
     """
     extras = pd.DataFrame(annotations.extras).assign(image_id=annotations.image_ids)
+    is_shown = extras["source_image_id"] == min(person, extras["source_image_id"].max())
     detectors = list(marks.own_bodies(pd.DataFrame({"detector": list(found)}))["detector"])
     rows: dict[str, list] = {}
     titles, n_found = [], dict.fromkeys(detectors, 0)
-    for dose, levels in extras[extras["source_image_id"] == person].groupby("dose", sort=False):
+    for dose, levels in extras[is_shown].groupby("dose", sort=False):
         for k in np.unique(np.linspace(0, len(levels) - 1, 5).round().astype(int)):
             image_id, level = int(levels["image_id"].iloc[k]), levels["level"].iloc[k]
             image = read_image(Path(folder) / "images" / annotations.images[image_id].file_name)
+            times = max(1, 320 // max(image.shape))  # coarse pixels, fine lines
+            image = image.repeat(times, axis=0).repeat(times, axis=1)
             for detector in detectors:
                 people = found[detector].get(image_id, Detections.none())
-                image = draw_detections(image, people, detector)
+                points_px = (people.keypoints_px + 0.5) * times - 0.5
+                image = draw_detections(image, replace(people, keypoints_px=points_px), detector)
                 n_found[detector] += len(people) > 0
             rows.setdefault(dose, []).append(image)
             titles.append(_UNITS.get(dose, "{:.0%}").format(level))

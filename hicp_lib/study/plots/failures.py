@@ -14,6 +14,7 @@ from hicp_lib.datasets.visibility import CLASSES, MIN_PEOPLE
 from hicp_lib.evaluation.cases import Found, Truth
 from hicp_lib.evaluation.failures.error_kinds import HITS, KINDS
 from hicp_lib.evaluation.failures.placed_keypoints import STATES
+from hicp_lib.evaluation.failures.without_head import HEAD_POINTS
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.inspection.skeletons import draw_rings
 from hicp_lib.study.plots import marks
@@ -61,6 +62,7 @@ def class_examples(classes: pd.DataFrame, truth: Truth, folders: Mapping[str, Pa
 @in_style
 def class_precision(table: pd.DataFrame, note: str) -> Figure:
     """Average precision per class; `table` from `compare_classes`."""
+    table = table[table["metric"].isin(["AP", "AR"])]
     rows = table[table["metric"] == "AP"]
     rows = rows[(rows["group"] != "body") | rows.index.isin(marks.own_bodies(rows).index)]
     names, detectors = [name for name in CLASSES if name in set(rows["class"])], rows["detector"].unique()
@@ -157,9 +159,12 @@ def invented_heads(heads: pd.DataFrame, folder: Path, truth: Annotations, found:
     scores = heads.groupby(["detector", "image_id"], sort=False)["score"].mean()
     for detector, image_id in scores.groupby("detector", sort=False).idxmax():
         image = read_image(Path(folder) / "images" / truth.images[image_id].file_name)
-        n_px, people = image.shape[0] // 3, found["headless", detector][image_id]
-        image = np.pad(image, ((n_px, n_px), (n_px, n_px), (0, 0)), constant_values=225)
-        moved = replace(people, keypoints_px=people.keypoints_px + n_px)
+        people = found["headless", detector][image_id]
+        head_px = people.keypoints_px[:, HEAD_POINTS].reshape(-1, 2)
+        sides = -np.nanmin(head_px, axis=0), np.nanmax(head_px, axis=0) - image.shape[1::-1]
+        (left, top), (right, bottom) = (np.clip(side, 0, max(image.shape)).astype(int) + 9 for side in sides)
+        image = np.pad(image, ((top, bottom), (left, right), (0, 0)), constant_values=225)
+        moved = replace(people, keypoints_px=people.keypoints_px + [left, top])
         pictures.append(draw_detections(image, moved, detector))
         titles.append(f"{detector}\nscore of the head {scores[detector, image_id]:.2f}")
     beyond = (heads["landed"] == "outside").groupby(heads["detector"], sort=False).mean()
@@ -245,9 +250,12 @@ def gallery(
             image = draw_rings(image, ringed, 20)
         pictures[case[row]].append(image)
         titles.append("\n".join(case[name] for name in _TITLES if name in case and name != row))
-    said = [" ".join(f"{name}: {title}".split()) for name, title in zip(cases[row], titles, strict=True)]
-    told = texts("gallery" if row == "detector" else "lost_points", note=note, n=len(cases), rows=said)
+    said = [" ".join(case[name] for name in _TITLES if name in case) for case in cases.to_dict("records")]
+    told = {"note": note, "n": len(cases), "rows": list(dict.fromkeys(said))}
+    name = "gallery" if row == "detector" else "lost_points"
     width = max(map(len, pictures.values()))
-    drawn = picture_grid(list(pictures.values()), *told, list(pictures), cell_in=WIDTH_IN / width)
+    drawn = picture_grid(
+        list(pictures.values()), *texts(name, **told), list(pictures), cell_in=WIDTH_IN / width
+    )
     title_pictures(drawn, titles, 7)
     return drawn

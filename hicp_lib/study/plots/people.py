@@ -117,7 +117,17 @@ def picture_grid(
 
 
 def title_pictures(grid: Figure, titles: Sequence[str], fontsize: float) -> None:
-    """Write a title over each picture of a `picture_grid`, row by row; its empty cells have none."""
+    """Write a title over each picture of a grid; empty cells have none.
+
+    Parameters
+    ----------
+    grid : Figure
+        As from `picture_grid`.
+    titles : sequence of str
+        Row by row.
+    fontsize : float
+        In points.
+    """
     for axis, title in zip([axis for axis in grid.figure.axes if axis.images], titles, strict=True):
         axis.set_title(title, loc="center", fontsize=fontsize, pad=2)
 

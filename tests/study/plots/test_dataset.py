@@ -59,4 +59,4 @@ def test_crops_below_the_limit_are_counted_and_ticks_are_plain_numbers(limit, sm
     figure = crop_sizes(table, limit, "made up")
     assert f"{small} of 3 crops" in figure.alt and "median is 22,000 px" in figure.alt
     labels = [label.get_text() for label in figure.figure.axes[0].get_xticklabels()]
-    assert labels == ["30,000"]
+    assert labels == ["20,000"]
