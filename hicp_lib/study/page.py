@@ -143,7 +143,9 @@ class Study:
         display({PLOTLY_MIME: json.loads(data), "text/html": body}, raw=True)
         self._show_figure(name, "", caption, ["json"], alt=alt)
 
-    def table(self, name: str, table: pd.DataFrame, caption: str, digits: int = 3) -> None:
+    def table(
+        self, name: str, table: pd.DataFrame, caption: str, digits: int = 3, shown: pd.DataFrame | None = None
+    ) -> None:
         """Save a table (Parquet, CSV) and show it; NaN is shown as a dash.
 
         Parameters
@@ -153,10 +155,12 @@ class Study:
         caption : str
         digits : int
             Decimals of its floats, as shown.
+        shown : pd.DataFrame, optional
+            What the page shows in its place: fewer columns, texts with intervals.
         """
         self._save_for_download(name, table)
-        shown = table.rename(columns=escaped).map(_cell)
-        style = shown.style.hide(axis="index").format(precision=digits, na_rep="–").set_uuid(name)
+        cells = (table if shown is None else shown).rename(columns=escaped).map(_cell)
+        style = cells.style.hide(axis="index").format(precision=digits, na_rep="–").set_uuid(name)
         body = style.to_html(table_attributes='class="table"')
         self._show_figure(name, f'<div class="hicp-table">{body}</div>', caption, ["parquet", "csv"])
 
