@@ -108,7 +108,7 @@ def _scatter_detector(axis, by_metric: pd.DataFrame, detector: str) -> None:
     reach = {"xerr": marks.whiskers(by_metric.loc[["AR"]]), "yerr": marks.whiskers(by_metric.loc[["AP"]])}
     axis.errorbar(x["AR"], y["AP"], **reach, color=pen["color"], elinewidth=0.8)
     for fill, *place in zip(fills, x, y, strict=True):
-        axis.plot(*place, **pen, fillstyle=fill, markerfacecoloralt="white")
+        axis.plot(*place, **pen, fillstyle=fill, markerfacecoloralt="white", clip_on=False)
 
 
 @in_style
