@@ -108,7 +108,7 @@ def _scatter_detector(axis, by_metric: pd.DataFrame, detector: str) -> None:
     reach = {"xerr": marks.whiskers(by_metric.loc[["AR"]]), "yerr": marks.whiskers(by_metric.loc[["AP"]])}
     axis.errorbar(x["AR"], y["AP"], **reach, color=pen["color"], elinewidth=0.8)
     for fill, *place in zip(fills, x, y, strict=True):
-        axis.plot(*place, **pen, fillstyle=fill, markerfacecoloralt="white")
+        axis.plot(*place, **pen, fillstyle=fill, markerfacecoloralt="white", clip_on=False)
 
 
 @in_style
@@ -155,7 +155,16 @@ def _by_subset(rows: pd.DataFrame, labels: dict[str, str], across: str):
 
 
 def dots_by_subset(axis, rows: pd.DataFrame, names: list[str]) -> None:
-    """Dots with whiskers in rows named after detectors, a mark per subset; Basic and Headless are joined."""
+    """Dots with whiskers in rows named after detectors, a mark per subset; Basic and Headless are joined.
+
+    Parameters
+    ----------
+    axis : matplotlib.axes.Axes
+    rows : pd.DataFrame
+        Columns `subset, detector, value, low, high`.
+    names : list of str
+        The detectors, the first on top.
+    """
     subsets = [name for name in _SUBSETS if name in set(rows["subset"])]
     places = rows["subset"].map(subsets.index).map(lambda k: marks.offset(k, len(subsets), 0.22))
     for detector, of in rows.assign(y=places).dropna(subset="value").groupby("detector", sort=False):
