@@ -58,7 +58,7 @@ def _status(name: str, run: Collection[str]) -> str:
     if name in ("mediapipe-pose", "mediapipe-hands") and "mediapipe" in run:
         return "run, within mediapipe"
     command = command_to_use if DETECTORS[name].needs_model else command_to_run
-    fetched = "hicp models fetch rtmw-l-384x288, then " if name == "mmpose" else ""  # the one that runs as it comes
+    fetched = "hicp models fetch rtmw-l-384x288, then " if name == "mmpose" else ""
     return f"not run; {fetched}{command(name)}"
 
 
