@@ -216,7 +216,7 @@ def test_in_space_stand_our_medians_the_papers_and_the_floor_where_it_is_known(r
     assert "wrists are 4.0 cm off and elbows 4.0 cm**" in page
     assert "The paper reports 2.8 to 2.9 and 3.5 to 4.3 cm" in page
     assert (
-        "come out 3.3 to 5.0 cm off. Above that floor, the detectors add at most 0.2 cm." in page
+        "come out 3.3 to 5.0 cm off (the *floor*). Above it, the detectors add at most 0.2 cm." in page
     ) == bool(floor)
     assert "leaves 2.0 cm at wrists and 2.0 cm at elbows" in page
 
