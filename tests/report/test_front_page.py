@@ -244,6 +244,6 @@ def test_the_near_subset_and_photographs_are_told_where_there_are_some(run):
     taus = {"basic": 0.8, "headless": 1.0}
     run.table(PHOTOGRAPHS, "agreement", [{"subset": s, "n_detectors": 5, "tau": t} for s, t in taus.items()])
     page = run.page()
-    assert "**As near as a robot's hand reaches,** a finds 70 % of people (9 people, 1.0 m away)." in page
+    assert "**From near, as a robot sees people within reach,** a finds 70 % of people (9 people," in page
     assert "| body, near | a | AP 0.60 [0.55, 0.65] |" in page
     assert "is 0.80 with heads and 1.00 without heads." in page
