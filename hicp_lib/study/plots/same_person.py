@@ -55,7 +55,8 @@ def _drawn(oks: pd.DataFrame, folders, truth, found, note: str) -> Figure:
         image = read_image(Path(folders[subset]) / "images" / truth[subset].images[shown].file_name)
         seen = {name: found[subset, name].get(shown, Detections.none()) for name in of_shown.index}
         pictures[row] = image, seen
-        titles += [f"{name}\nOKS {value:.2f}" for name, value in of_shown[subset].items()]
+        names = [f"{name}\n" for name in of_shown.index] if not titles else [""] * len(of_shown)
+        titles += [f"{name}OKS {value:.2f}" for name, value in zip(names, of_shown[subset], strict=True)]
         said.append(f"{row}, {series_text(of_shown[subset])}")
     figure = detections_grid(pictures, _MIN_SCORE)
     size_pt = _TEXT_PT * figure.figure.get_figwidth()
