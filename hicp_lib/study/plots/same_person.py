@@ -40,9 +40,7 @@ def same_person(
         What the data are, for the caption.
     """
     of_bodies = oks[oks["group"] == "body"].groupby(["image_id", "detector", "subset"], sort=False)["oks"]
-    return _drawn(
-        of_bodies.max().unstack().reindex(columns=list(_ROWS)).dropna(), folders, truth, found, note
-    )
+    return _drawn(of_bodies.max().unstack().reindex(columns=[*_ROWS]).dropna(), folders, truth, found, note)
 
 
 @in_style
