@@ -59,7 +59,6 @@ def _status(name: str, run: Collection[str]) -> str:
     if name in ("mediapipe-pose", "mediapipe-hands") and "mediapipe" in run:
         return "run, within mediapipe"
     command = command_to_use if DETECTORS[name].needs_model else command_to_run
-    # The one that runs as it comes.
     fetched = "hicp models fetch rtmw-l-384x288, then " if name == "mmpose" else ""
     return f"not run; {fetched}{command(name)}"
 

@@ -216,7 +216,7 @@ def test_in_space_stand_our_medians_the_papers_and_the_floor_where_it_is_known(r
     assert "wrists are 4.0 cm off and elbows 4.0 cm**" in page
     assert "The paper reports 2.8 to 2.9 and 3.5 to 4.3 cm" in page
     assert (
-        "come out 3.3 to 5.0 cm off. Above that floor, the detectors add at most 0.2 cm." in page
+        "come out 3.3 to 5.0 cm off (the *floor*). Above it, the detectors add at most 0.2 cm." in page
     ) == bool(floor)
     assert "leaves 2.0 cm at wrists and 2.0 cm at elbows" in page
 
@@ -244,6 +244,6 @@ def test_the_near_subset_and_photographs_are_told_where_there_are_some(run):
     taus = {"basic": 0.8, "headless": 1.0}
     run.table(PHOTOGRAPHS, "agreement", [{"subset": s, "n_detectors": 5, "tau": t} for s, t in taus.items()])
     page = run.page()
-    assert "**As near as a robot's hand reaches,** a finds 70 % of people (9 people, 1.0 m away)." in page
+    assert "**From near, as a robot sees people within reach,** a finds 70 % of people (9 people," in page
     assert "| body, near | a | AP 0.60 [0.55, 0.65] |" in page
     assert "is 0.80 with heads and 1.00 without heads." in page

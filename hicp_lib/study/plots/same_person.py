@@ -39,9 +39,8 @@ def same_person(
     note : str
         What the data are, for the caption.
     """
-    bodies = oks[(oks["group"] == "body") & oks["subset"].isin(list(_ROWS))]
-    both = bodies.groupby(["image_id", "detector", "subset"], sort=False)["oks"].max().unstack()
-    return _drawn(both.reindex(columns=list(_ROWS)).dropna(), folders, truth, found, note)
+    of_bodies = oks[oks["group"] == "body"].groupby(["image_id", "detector", "subset"], sort=False)["oks"]
+    return _drawn(of_bodies.max().unstack().reindex(columns=[*_ROWS]).dropna(), folders, truth, found, note)
 
 
 @in_style
@@ -55,7 +54,8 @@ def _drawn(oks: pd.DataFrame, folders, truth, found, note: str) -> Figure:
         image = read_image(Path(folders[subset]) / "images" / truth[subset].images[shown].file_name)
         seen = {name: found[subset, name].get(shown, Detections.none()) for name in of_shown.index}
         pictures[row] = image, seen
-        titles += [f"{name}\nOKS {value:.2f}" for name, value in of_shown[subset].items()]
+        told = [f"{name}\nOKS {value:.2f}" for name, value in of_shown[subset].items()]
+        titles += [text.partition("\n")[2] for text in told] if titles else told
         said.append(f"{row}, {series_text(of_shown[subset])}")
     figure = detections_grid(pictures, _MIN_SCORE)
     size_pt = _TEXT_PT * figure.figure.get_figwidth()
