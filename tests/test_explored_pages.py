@@ -1,4 +1,4 @@
-"""The built book in headless Chromium, from disk: what its pages offer to explore opens, and loads then only."""
+"""The built book in Chromium, from disk: what its pages offer to explore opens, and loads only then."""
 
 from __future__ import annotations
 
