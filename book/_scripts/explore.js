@@ -120,7 +120,8 @@ function hicpLegend(styles, heads, change) {
   const head = hicpMake("thead", {}, hicpMake("tr", {}, ...columns));
   const element = hicpMake("table", {}, head, hicpMake("tbody", {}, ...Object.values(rows)));
   const fill = (name, texts) => texts.forEach((text, k) => (rows[name].cells[k + 1].textContent = text ?? "–"));
-  return {element, fill, isShown: ({name}) => !hidden.has(name)};
+  const paint = (name, colour) => rows[name].querySelector("path").setAttribute("fill", colour);
+  return {element, fill, paint, isShown: ({name}) => !hidden.has(name)};
 }
 
 /** The numbers of a detector and group, of rows that begin with these two; none where there is no such row. */

@@ -95,6 +95,8 @@ hicpExplorers.films = (place, data, folder) => {
     film.width = film.sheet.naturalWidth / data.columns;
     film.height = film.sheet.naturalHeight / Math.ceil(film.frames.length / data.columns);
     [film.centre, film.half] = hicpAim(film);
+    const {colour} = data.detectors.find(({name}) => name === chosen.detector);
+    if (data.bodies.includes("perceived")) legend.paint("perceived", colour);
     at = Math.min(at, film.steps.length - 1);
     time.input.max = film.steps.length - 1;
     draw();

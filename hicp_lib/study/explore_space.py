@@ -33,13 +33,15 @@ _STEP_S = 0.1
 _FACELESS = np.isin(np.arange(N_KEYPOINTS), np.r_[BODY, HANDS]).astype(float)
 
 
-def runs(chosen: Iterable[Run]) -> Explored:
+def runs(chosen: Iterable[Run], n_people: int = 4) -> Explored:
     """Runs of avoidance: the person as they are and as perceived, the robot and its threatened taxels.
 
     Parameters
     ----------
     chosen : iterable of Run
         Those without images are left out.
+    n_people : int, optional
+        Of each script, at most.
 
     Returns
     -------
@@ -53,6 +55,8 @@ def runs(chosen: Iterable[Run]) -> Explored:
         name, trial = f"film-{len(films)}", run.job.trial
         numbers = people.setdefault(trial.script, {})
         person = numbers.setdefault(trial.subject.number, len(numbers) + 1)
+        if person > n_people:
+            continue
         films.append({"script": trial.script, "person": person, "detector": run.job.condition})
         frames = [frame for _, frame in run.frames.iterrows()]
         every = max(1, round(_STEP_S / run.cycles["t_s"].diff().median()))

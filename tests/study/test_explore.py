@@ -131,6 +131,7 @@ def test_runs_become_films_of_pictures_bodies_and_the_robot():
     unseeing = Run(Job(Trial("sitting, hand"), "ground truth"), make_run().cycles, pd.DataFrame())
     data, files = explore_space.runs([unseeing, make_run(), make_run("movenet-thunder")])
     assert [film["detector"] for film in data["films"]] == DETECTORS
+    assert explore_space.runs([make_run()], n_people=0)[0]["films"] == []
     film = read_script(files[data["films"][0]["file"]])
     assert [frame["t_s"] for frame in film["frames"]] == [0.0, 0.4]
     assert [step["t_s"] for step in film["steps"][:3]] == [0.0, 0.1, 0.2]
