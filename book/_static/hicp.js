@@ -32,18 +32,17 @@ document.addEventListener("DOMContentLoaded", () => {
     box.showModal();
   });
 
-  // Only what is wider than its place takes part in the order of the Tab key.
+  // Only what is wider than its place takes part in the order of the Tab key; tables are told by their caption.
   const measure = new ResizeObserver((entries) => entries.forEach(({ target }) => {
+    const caption = target.querySelector("caption");
     const isWider = target.scrollWidth > target.clientWidth;
     target.classList.toggle("hicp-wider", isWider);
-    if (!isWider) ["tabindex", "role", "aria-label"].forEach((name) => target.removeAttribute(name));
-    else {
-      const name = target.querySelector("caption")?.textContent ?? "Code";
-      target.tabIndex = 0;
-      target.setAttribute("role", "region");
-      target.setAttribute("aria-label", `${name} (scrolls)`);
-    }
+    const names = { tabindex: 0, ...(caption && { role: "region", "aria-label": `${caption.textContent} (scrolls)` }) };
+    Object.entries(names).forEach(([name, value]) => {
+      if (isWider) target.setAttribute(name, value);
+      else target.removeAttribute(name);
+    });
   }));
-  document.querySelectorAll(".hicp-table, .pst-scrollable-table-container, pre, .math")
+  document.querySelectorAll(".hicp-table, .pst-scrollable-table-container, pre, .hicp-formula")
     .forEach((part) => measure.observe(part));
 });

@@ -43,6 +43,11 @@ def finish_page(page: BeautifulSoup, path: Path, book: Path) -> None:
         _fold(page, source)
     for table in page.find_all("table"):
         _name(page, table)
+    for summary in page.find_all("summary"):
+        if not summary.get_text(strip=True):
+            summary["aria-label"] = "Pages within"
+    if sidebar := page.find(id="pst-primary-sidebar"):
+        sidebar.attrs |= {"role": "complementary", "aria-label": "Book"}
 
 
 @cache
