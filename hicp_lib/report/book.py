@@ -124,8 +124,9 @@ def _assemble(source: Path, folders: Folders, left_out: Mapping[str, str]) -> No
         _write_stub(folders.sources / "notebooks" / f"{name}.ipynb", notebooks / f"{name}.ipynb", reason)
     scripts = source / SCRIPTS_DIR
     scripts.mkdir()
-    plotly = importlib.resources.files("plotly") / "package_data" / "plotly.min.js"
-    shutil.copy(str(plotly), scripts / PLOTLY_PATH)
+    shutil.copy(
+        str(importlib.resources.files("plotly") / "package_data/plotly.min.js"), scripts / PLOTLY_PATH
+    )
 
 
 def _write_stub(original: Path, stub: Path, reason: str) -> None:

@@ -7,7 +7,6 @@ from pathlib import Path
 from bs4 import BeautifulSoup, Tag
 from PIL import Image
 
-_OF_SEARCH = ("searchindex.js", "searchtools.js", "language_data.js")
 _ICON = re.compile(r'[{,]"?([a-z][a-z0-9-]*)"?:\[(\d+),(\d+),\[[^\]]*\],"\w+","([^"]+)"\]')
 # What writes an icon as a letter of a font.
 _LETTERS = re.compile(r"\.fa-[\w-]+:+before(,\.fa-[\w-]+:+before)*\{content:[^{}]*\}")
@@ -29,19 +28,22 @@ def finish_page(page: BeautifulSoup, path: Path, book: Path) -> None:
         Where it lies; the files that it shows lie there already.
     book : Path
     """
-    # The theme loads a megabyte for a dozen icons, which are put in as drawings, and on each page the search.
-    unused = ("fontawesome.js",) if path.name == "search.html" else ("fontawesome.js", *_OF_SEARCH)
-    for script in page.find_all("script", src=re.compile("|".join(unused))):
-        script.decompose()
+    # On every page the theme loads the search, and a megabyte for a dozen icons, which are put in as drawings.
+    unused = (
+        "fontawesome.js" if path.name == "search.html" else "fontawesome.js|searchindex|searchtools|language"
+    )
+    unused += "" if page.find(class_=re.compile("^sd-")) else "|sphinx-design"
+    for tag in page.find_all(["script", "link"]):
+        if re.search(unused, str(tag.get("src") or tag.get("href"))):
+            tag.decompose()
     for icon in page.find_all("i", class_=re.compile("^fa-")):
         _draw(icon, book / "_static" / "scripts" / "fontawesome.js")
     for figure in page.find_all("figure", class_="hicp"):
         _show_file(page, figure, path.parent)
     for table in page.find_all("table"):
         _name(page, table)
-    for summary in page.find_all("summary"):
-        if not summary.get_text(strip=True):
-            summary["aria-label"] = "Pages within"
+    for toggle in page.find_all("span", class_="toctree-toggle"):
+        toggle.parent["aria-label"] = "Pages within"
     if sidebar := page.find(id="pst-primary-sidebar"):
         sidebar.attrs |= {"role": "complementary", "aria-label": "Book"}
 
@@ -54,8 +56,7 @@ def _icons(script: Path) -> dict[str, list[str]]:
 
 def _draw(icon: Tag, script: Path) -> None:
     drawings = _icons(script)
-    names = [name.removeprefix("fa-") for name in icon["class"]]
-    width, height, path = next(drawings[name] for name in names if name in drawings)
+    width, height, path = next(filter(None, (drawings.get(name[3:]) for name in icon["class"])))  # fa-NAME
     icon.name, icon["class"] = "svg", ["svg-inline--fa", *icon["class"]]
     icon.attrs |= {"viewBox": f"0 0 {width} {height}", "aria-hidden": "true"}
     icon.append(BeautifulSoup(f'<path fill="currentColor" d="{path}"></path>', "html.parser"))

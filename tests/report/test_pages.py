@@ -74,6 +74,12 @@ def test_a_table_is_told_by_a_caption(book, around, caption):
     assert [cell.name for cell in page.tr.find_all(["td", "th"])] == ["td", "th"]
 
 
+def test_a_style_sheet_stays_where_a_page_needs_it(book):
+    sheet = '<link rel="stylesheet" href="sphinx-design.min.css">'
+    assert finished(book, sheet).link is None
+    assert finished(book, f'{sheet}<div class="sd-card"></div>').link is not None
+
+
 def test_the_style_sheet_loses_letters_and_nothing_else(book):
     sheet = book / "_static" / "styles" / "pydata-sphinx-theme.css"
     kept = ".toc .fa-bars{font-size:1rem}"
