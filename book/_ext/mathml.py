@@ -23,7 +23,7 @@ def _inline(writer: Any, node: nodes.math) -> None:
 
 
 def _displayed(writer: Any, node: nodes.math_block) -> None:
-    writer.body.append(f'<div class="math">{_mathml(node, as_block=True)}</div>')
+    writer.body.append(f'<div class="hicp-formula">{_mathml(node, as_block=True)}</div>')
     raise nodes.SkipNode
 
 

@@ -1,49 +1,51 @@
-// What pages do beyond the theme's: unfold code, enlarge figures, scroll wide tables by keyboard.
-// Each works without: folds open one by one, figures lead to their files.
+// What pages do beyond the theme's: show code, enlarge figures, scroll wide tables by keyboard.
+const showCode = (isShown) => {
+  document.documentElement.classList.toggle("hicp-code", isShown);
+  document.querySelectorAll(".hicp-show-code").forEach((button) => { button.textContent = isShown ? "Hide code" : "Show code"; });
+  document.querySelectorAll("details.hide").forEach((fold) => { fold.open = true; });
+};
+const isCodeShown = () => localStorage.getItem("hicp-code") === "shown";
+showCode(isCodeShown()); // before anything is drawn
+
 document.addEventListener("DOMContentLoaded", () => {
-  const folds = document.querySelectorAll("details.hicp-code");
-  if (folds.length) {
+  if (document.querySelector(".cell_input")) {
     const button = document.createElement("button");
-    const show = (isShown) => {
-      folds.forEach((fold) => { fold.open = isShown; });
-      button.textContent = isShown ? "Hide code" : "Show code";
-    };
     button.className = "hicp-show-code";
     button.addEventListener("click", () => {
-      const isShown = localStorage.getItem("hicp-code") !== "shown";
-      localStorage.setItem("hicp-code", isShown ? "shown" : "hidden");
-      show(isShown);
+      localStorage.setItem("hicp-code", isCodeShown() ? "hidden" : "shown");
+      showCode(isCodeShown());
     });
     document.querySelector("article h1").after(button);
-    show(localStorage.getItem("hicp-code") === "shown");
+    showCode(isCodeShown());
   }
 
   const box = document.createElement("dialog");
   box.className = "hicp-enlarged";
+  const close = document.createElement("button");
+  close.textContent = "Close";
   box.addEventListener("click", () => box.close());
   document.addEventListener("click", (event) => {
     const link = event.target.closest("a.hicp-zoom");
     if (!link || event.ctrlKey || event.metaKey || event.shiftKey) return;
     event.preventDefault();
     const image = link.firstElementChild.cloneNode();
-    box.replaceChildren(image);
+    box.replaceChildren(close, image);
     box.setAttribute("aria-label", image.alt);
     if (!box.isConnected) document.body.append(box);
     box.showModal();
   });
 
-  // Only what is wider than its place takes part in the order of the Tab key.
+  // Only what is wider than its place takes part in the order of the Tab key; tables are told by their caption.
   const measure = new ResizeObserver((entries) => entries.forEach(({ target }) => {
+    const caption = target.querySelector("caption");
     const isWider = target.scrollWidth > target.clientWidth;
     target.classList.toggle("hicp-wider", isWider);
-    if (!isWider) ["tabindex", "role", "aria-label"].forEach((name) => target.removeAttribute(name));
-    else {
-      const name = target.querySelector("caption")?.textContent ?? "Code";
-      target.tabIndex = 0;
-      target.setAttribute("role", "region");
-      target.setAttribute("aria-label", `${name} (scrolls)`);
-    }
+    const names = { tabindex: 0, ...(caption && { role: "region", "aria-label": `${caption.textContent} (scrolls)` }) };
+    Object.entries(names).forEach(([name, value]) => {
+      if (isWider) target.setAttribute(name, value);
+      else target.removeAttribute(name);
+    });
   }));
-  document.querySelectorAll(".hicp-table, .pst-scrollable-table-container, pre, .math")
+  document.querySelectorAll(".hicp-table, .pst-scrollable-table-container, pre, .hicp-formula")
     .forEach((part) => measure.observe(part));
 });

@@ -19,7 +19,7 @@ from hicp_lib.core.datafiles import REFERENCE_DIR
 from hicp_lib.core.escape import escaped
 from hicp_lib.core.files import read_json, sha256_file, write_json
 from hicp_lib.report.checks import book_problems
-from hicp_lib.report.pages import finish_page
+from hicp_lib.report.pages import drop_icon_font, finish_page
 from hicp_lib.report.prose import Results, render_page
 from hicp_lib.report.run import Folders, RunError
 from hicp_lib.report.runs import outputs, read_stamp
@@ -73,6 +73,7 @@ def build_book(folders: Folders, left_out: Mapping[str, str] | None = None) -> t
         _assemble(staging / "source", folders, left_out)
         built = _run_sphinx(staging, book.parent / f"{folders.profile}.log")
         shutil.copytree(folders.results, built / "results" / folders.profile)
+        drop_icon_font(built)
         if problems := book_problems(built, lambda page, path: finish_page(page, path, built)):
             raise RunError(f"book: {problems[0]} ({len(problems)} such problems in all)")
         if _key(folders, left_out) != key:

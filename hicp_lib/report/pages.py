@@ -1,4 +1,4 @@
-"""What a built page is given beyond Sphinx: less to load, code folded away, names for what has none."""
+"""What a built page is given beyond Sphinx: less to load, and names for what has none."""
 
 import re
 from functools import cache
@@ -7,17 +7,15 @@ from pathlib import Path
 from bs4 import BeautifulSoup, Tag
 from PIL import Image
 
-# What the theme loads on every page -> what a page holds that needs it.
-_LOADED_FOR = {
-    "fontawesome.js": "<fontawesome>",  # a megabyte for a dozen icons: they are put in as drawings
-    "searchindex.js": 'id="search-results"',
-    "searchtools.js": 'id="search-results"',
-    "language_data.js": 'id="search-results"',
-    "sphinx-design": 'class="sd-',
-}
-_SHOWN_CODE = {"tag_look-inside", "tag_try-it"}
-_FOLDED = {"tag_parameters": "Parameters", "tag_injected-parameters": "Parameters of this run"}
 _ICON = re.compile(r'[{,]"?([a-z][a-z0-9-]*)"?:\[(\d+),(\d+),\[[^\]]*\],"\w+","([^"]+)"\]')
+# What writes an icon as a letter of a font.
+_LETTERS = re.compile(r"\.fa-[\w-]+:+before(,\.fa-[\w-]+:+before)*\{content:[^{}]*\}")
+
+
+def drop_icon_font(book: Path) -> None:
+    """Take the letters of two thousand icons from the style sheet that all pages load and none uses."""
+    sheet = book / "_static" / "styles" / "pydata-sphinx-theme.css"
+    sheet.write_text(_LETTERS.sub("", sheet.read_text()))
 
 
 def finish_page(page: BeautifulSoup, path: Path, book: Path) -> None:
@@ -30,19 +28,24 @@ def finish_page(page: BeautifulSoup, path: Path, book: Path) -> None:
         Where it lies; the files that it shows lie there already.
     book : Path
     """
-    text = str(page)
-    unused = [name for name, sign in _LOADED_FOR.items() if sign not in text]
+    # On every page the theme loads the search, and a megabyte for a dozen icons, which are put in as drawings.
+    unused = (
+        "fontawesome.js" if path.name == "search.html" else "fontawesome.js|searchindex|searchtools|language"
+    )
+    unused += "" if page.find(class_=re.compile("^sd-")) else "|sphinx-design"
     for tag in page.find_all(["script", "link"]):
-        if any(name in str(tag.get("src") or tag.get("href")) for name in unused):
+        if re.search(unused, str(tag.get("src") or tag.get("href"))):
             tag.decompose()
     for icon in page.find_all("i", class_=re.compile("^fa-")):
         _draw(icon, book / "_static" / "scripts" / "fontawesome.js")
     for figure in page.find_all("figure", class_="hicp"):
         _show_file(page, figure, path.parent)
-    for source in page.find_all("div", class_="cell_input"):
-        _fold(page, source)
     for table in page.find_all("table"):
         _name(page, table)
+    for toggle in page.find_all("span", class_="toctree-toggle"):
+        toggle.parent["aria-label"] = "Pages within"
+    if sidebar := page.find(id="pst-primary-sidebar"):
+        sidebar.attrs |= {"role": "complementary", "aria-label": "Book"}
 
 
 @cache
@@ -53,43 +56,24 @@ def _icons(script: Path) -> dict[str, list[str]]:
 
 def _draw(icon: Tag, script: Path) -> None:
     drawings = _icons(script)
-    names = [name.removeprefix("fa-") for name in icon["class"]]
-    width, height, path = next(drawings[name] for name in names if name in drawings)
-    icon.name = "svg"
-    icon.attrs |= {"class": ["svg-inline--fa", *icon["class"]], "viewBox": f"0 0 {width} {height}"}
-    icon.attrs |= {"aria-hidden": "true"}
+    width, height, path = next(filter(None, (drawings.get(name[3:]) for name in icon["class"])))  # fa-NAME
+    icon.name, icon["class"] = "svg", ["svg-inline--fa", *icon["class"]]
+    icon.attrs |= {"viewBox": f"0 0 {width} {height}", "aria-hidden": "true"}
     icon.append(BeautifulSoup(f'<path fill="currentColor" d="{path}"></path>', "html.parser"))
 
 
 def _show_file(page: BeautifulSoup, figure: Tag, folder: Path) -> None:
     """The file that lies beside the page in place of the copy within, and in full when asked for."""
     shown, link = figure.find(["img", "video"]), figure.find("a", download=True)
-    if shown is None:
-        return
-    if link is not None:
+    if len(page.find_all(id=figure.get("id", ""))) > 1:
+        del figure["id"]  # a heading has it, and is a line above
+    if shown is not None and link is not None:
         shown["src"] = link["href"]
-    if shown.name == "video" or shown["src"].startswith("data:"):
+    if shown is None or shown.name == "video" or shown["src"].startswith("data:"):
         return
     with Image.open(folder / shown["src"]) as image:
-        width_px, height_px = image.size
-    shown.attrs |= {"width": width_px, "height": height_px, "loading": "lazy"}
+        shown.attrs |= dict(zip(("width", "height"), image.size, strict=True)) | {"loading": "lazy"}
     shown.wrap(page.new_tag("a", attrs={"class": "hicp-zoom", "href": shown["src"], "title": "Enlarge"}))
-
-
-def _fold(page: BeautifulSoup, source: Tag) -> None:
-    """Put a cell's code out of sight until it is asked for."""
-    cell = source.find_parent("div", class_="cell")
-    if _SHOWN_CODE.intersection(cell["class"]):
-        return
-    fold = source.find_parent("details")  # where the notebook says so itself
-    if fold is None:
-        fold = source.wrap(page.new_tag("details"))
-    else:
-        fold.summary.decompose()
-    fold["class"] = "hicp-code"
-    summary = page.new_tag("summary")
-    summary.string = next((word for tag, word in _FOLDED.items() if tag in cell["class"]), "Code")
-    fold.insert(0, summary)
 
 
 def _name(page: BeautifulSoup, table: Tag) -> None:

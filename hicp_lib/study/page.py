@@ -49,7 +49,7 @@ _PLOTLY_OPTIONS = {"displaylogo": False, "showSendToCloud": False, "responsive":
 _SVG_STYLE: dict[Any, Any] = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
 _SVG_OPTIONS: dict[str, Any] = {"format": "svg", "metadata": {"Date": None}}
 _DRAWING_OPTIONS: dict[str, Any] = {"format": "webp", "pil_kwargs": {"lossless": True, "method": 4}}
-_PICTURE_OPTIONS: dict[str, Any] = {"format": "webp", "pil_kwargs": {"quality": 80, "method": 4}}
+_PICTURE_OPTIONS: dict[str, Any] = {"format": "webp", "pil_kwargs": {"quality": 75, "method": 4}}
 
 
 class Study:
