@@ -26,7 +26,8 @@ BROWSER_FLAGS = (
 
 
 # What needs the book.
-OF_THE_BOOK = {f"test_{of}.py" for of in ("api_pages", "explored_pages", "jupyterlab", "links", "notebooks", "pages")}
+_OF_THE_BOOK = ("api_pages", "explored_pages", "jupyterlab", "links", "notebooks", "pages")
+OF_THE_BOOK = {f"test_{of}.py" for of in _OF_THE_BOOK}
 
 
 # What takes long, as measured; a file, or one test of it.
