@@ -1,36 +1,26 @@
 """Figures of the 2D comparison: precision against recall, the loss without a head, who is found, time."""
 
-from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.detections import Detections
-from hicp_lib.core.images import read_image
 from hicp_lib.evaluation.ap.found_and_placed import FOUND, OKS_OF_FOUND
-from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.photographs import PHOTOGRAPHED, RENDERED
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
-from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
 from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
 
-Run = Mapping[int, Detections]
 GROUP_TITLES = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
 WIDTH_IN = 5.5  # what can be read on a telephone, and fills a page
 # By OKS threshold: precision, recall, and how much of a marker is filled.
 _THRESHOLDS = {
-    ".5": ("AP50", "AR50", "none"),
-    ".75": ("AP75", "AR75", "left"),
-    ".5:.95": ("AP", "AR", "full"),
-}
+    ".5": ("AP50", "AR50", "none"), ".75": ("AP75", "AR75", "left"), ".5:.95": ("AP", "AR", "full"),
+}  # fmt: skip
 # Marks in the row of a detector, from above: marker, and its face if not filled.
 _SUBSETS: dict[str, tuple[str, str | None]] = {
     "whole images": ("^", None), "basic": ("o", None), "headless": ("o", "white"), "near": ("D", None),
 }  # fmt: skip
-_MIN_SCORE = 0.1  # of keypoints that are drawn
 _PENS = {
     RENDERED: {"color": "#0072B2", "fmt": "o", "label": RENDERED},
     PHOTOGRAPHED: {"color": "#D55E00", "fmt": "s", "label": PHOTOGRAPHED},
@@ -198,48 +188,6 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
     medians = table.groupby(["subset", "group", "detector"], sort=False)["oks"].median().rename("value")
     said = extreme(medians.reset_index(), "idxmin")
     return Figure(figure, *texts("oks_curves", note=data_note, said=said), table)
-
-
-def example(
-    images_dir: Path,
-    people: Annotations,
-    image_id: int,
-    found: Mapping[str, Run],
-    oks: pd.DataFrame,
-    note: str,
-) -> Figure:
-    """One person, annotated and as each detector sees them, with the OKS of the best detection.
-
-    Parameters
-    ----------
-    images_dir : Path
-        Folder of the images.
-    people : Annotations
-        The truth.
-    image_id : int
-        Which image.
-    found : mapping of str to mapping of int to Detections
-        By detector, then by image id.
-    oks : pd.DataFrame
-        As from `metric_table.people_oks`, of these people.
-    note : str
-        What the data are, for the caption.
-    """
-    image = read_image(images_dir / people.images[image_id].file_name)
-    own = (people.image_ids == image_id) & ~people.is_crowd
-    cells = {"annotated": draw_truth(people, images_dir, image_id, own, "#FFFFFF")}
-    bodies = oks[(oks["group"] == "body") & (oks["image_id"] == image_id)].set_index("detector")["oks"]
-    for name, run in found.items():
-        seen = run.get(image_id, Detections.none())
-        words = "nothing found" if not len(seen) else f"OKS {bodies[name]:.2f}" if name in bodies else "found"
-        cells[f"{name}\n{words}"] = draw_detections(image, seen, name, _MIN_SCORE)
-    rows = [list(cells.values())[start : start + 3] for start in range(0, len(cells), 3)]
-    said = [title.replace("\n", ": ") for title in cells][1:]
-    told = texts("example", note=note, said=said, min_score=_MIN_SCORE)
-    grid = picture_grid(rows, *told, titles=list(cells), cell_in=WIDTH_IN / 3)
-    for axis in grid.figure.axes:
-        axis.title.set_fontsize(9)
-    return grid
 
 
 @in_style

@@ -13,6 +13,7 @@ from hicp_lib.detectors.registry import DETECTORS, default_detector_names
 from hicp_lib.evaluation.ap.found_and_placed import found_and_placed
 from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.study.plots import evaluation, people
+from hicp_lib.study.plots.example import example
 from hicp_lib.study.plots.palette import DETECTOR_STYLES, detector_colour
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 from tests.evaluation.made_people import make_annotations
@@ -83,9 +84,7 @@ def test_an_example_has_the_truth_and_says_who_is_not_found(tmp_path):
     oks = pd.DataFrame(
         {"group": "body", "detector": ["posenet", "mmpose"], "image_id": 1, "oks": [0.87, 0.0]}
     )
-    figure = evaluation.example(
-        tmp_path, truth, 1, {"posenet": {1: there}, "mmpose": {}}, oks, "made-up people"
-    )
+    figure = example(tmp_path, truth, 1, {"posenet": {1: there}, "mmpose": {}}, oks, "made-up people")
     titles = [axis.get_title(loc="center") for axis in figure.figure.axes]
     assert titles == ["annotated", "posenet\nOKS 0.87", "mmpose\nnothing found"]
     assert all(axis.images for axis in figure.figure.axes)
