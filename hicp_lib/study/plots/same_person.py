@@ -49,14 +49,14 @@ def _drawn(oks: pd.DataFrame, folders, truth, found, note: str) -> Figure:
     losses = (oks["basic"] - oks["headless"]).groupby("image_id").mean().sort_values(kind="stable")
     shown = losses.index[len(losses) // 2]
     of_shown = oks.loc[shown]
-    pictures, titles, said = {}, [], []
+    pictures, said = {}, []
     for subset, row in _ROWS.items():
         image = read_image(Path(folders[subset]) / "images" / truth[subset].images[shown].file_name)
         seen = {name: found[subset, name].get(shown, Detections.none()) for name in of_shown.index}
         pictures[row] = image, seen
-        told = [f"{name}\nOKS {value:.2f}" for name, value in of_shown[subset].items()]
-        titles += [text.partition("\n")[2] for text in told] if titles else told
         said.append(f"{row}, {series_text(of_shown[subset])}")
+    titles = [f"{name}\nOKS {value:.2f}" for name, value in of_shown["basic"].items()]
+    titles += [f"OKS {value:.2f}" for value in of_shown["headless"]]
     figure = detections_grid(pictures, _MIN_SCORE)
     size_pt = _TEXT_PT * figure.figure.get_figwidth()
     for axis, title in zip(figure.figure.axes, titles, strict=True):
