@@ -49,9 +49,7 @@ def add_keys(axis, detectors: Iterable[str], others: Mapping[str, dict[str, Any]
         axis.plot([], [], **{"color": _NO_DETECTOR, "label": name} | style)
 
 
-def panels(
-    table: pd.DataFrame, by: Sequence[str], width_in: float, height_in: float, wrap: int = 99, **shared: Any
-):
+def panels(table: pd.DataFrame, by: Sequence[str], width_in: float, height_in: float, **shared: Any):
     """A figure with a panel for each value of a column (across), or of two (down, across).
 
     Parameters
@@ -61,10 +59,8 @@ def panels(
         Columns of the table; their values in the order they come in.
     width_in, height_in : float
         The figure's size in inches.
-    wrap : int
-        Panels in a row, at most; those of two columns are not wrapped.
     **shared : any
-        Further options of `new_figure`.
+        Further options of `new_figure`; `wrap`, how many panels of one column stand in a row at most.
 
     Returns
     -------
@@ -76,6 +72,7 @@ def panels(
     """
     values = [table[name].unique() for name in by]
     n_rows, n_columns = [1, *(max(len(of), 1) for of in values)][-2:]
+    wrap = shared.pop("wrap", n_columns)
     if n_rows == 1:
         n_rows, n_columns = -(-n_columns // wrap), min(n_columns, wrap)
     figure, axes = new_figure(n_rows, n_columns, width_in, height_in, squeeze=False, **shared)
