@@ -28,11 +28,9 @@ _ONE_CROP = ["subset", "image_id", "annotation_id"]
 _TITLES = ("detector", "case", "mistakes")  # what stands over a picture, but for what names its row
 _BLIND = 0.05  # a class in which no detector has a higher AP is one that all are blind to
 _KIND_COLOURS = ("#0072B2", "#8FC6E8", "#F0E442", "#CC79A7", "#D55E00", "#BDBDBD", "#5F5F5F")
-_KIND_STYLES = {
-    kind: {"color": colour, "edgecolor": "white", "lw": 0.4}
-    for kind, colour in zip(KINDS, _KIND_COLOURS, strict=True)
-}
-_STATE_STYLES = dict(zip(STATES, (("-", "o"), ("--", "s"), (":", "^"), (":", "x")), strict=True))
+_EDGE = {"edgecolor": "white", "lw": 0.4}
+_KIND_STYLES = {kind: _EDGE | {"color": c} for kind, c in zip(KINDS, _KIND_COLOURS, strict=True)}
+_STATE_STYLES = dict(zip(STATES[:3], (("-", "o"), ("--", "s"), (":", "^")), strict=True))
 
 
 def class_examples(classes: pd.DataFrame, truth: Truth, folders: Mapping[str, Path], note: str) -> Figure:
@@ -77,8 +75,8 @@ def class_precision(table: pd.DataFrame, note: str) -> Figure:
     counts = rows.drop_duplicates("class").set_index("class")["n_people"]
     marks.name_rows(axes[0, 0], [textwrap.fill(f"{name} ({counts.get(name, 0)})", 22) for name in names])
     marks.legend_below(figure, axes, ncols=2)
-    best = rows[rows["group"] == "body"].dropna(subset="value").sort_values("value", ascending=False)
-    best = best.drop_duplicates("class")
+    best = rows[rows["group"] == "body"].sort_values("value", ascending=False, kind="stable")
+    best = best.dropna(subset="value").drop_duplicates("class")
     said = {"said": best[best["value"] >= _BLIND], "blind": list(best.loc[best["value"] < _BLIND, "class"])}
     return Figure(figure, *texts("class_precision", note=note, **said), table)
 
@@ -116,10 +114,9 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
         marks.name_rows(axis, order)
     axes[-1, 0].set(xlabel="share of labelled keypoints")
     marks.legend_below(figure, axes)
-    wrong = rows[~rows["kind"].isin(HITS)].dropna(subset="share")
-    commonest = wrong.sort_values("share", ascending=False).drop_duplicates("detector")
-    commonest = commonest.assign(of=commonest[by])
-    return Figure(figure, *texts("error_kinds", note=note, by=by, said=commonest), table)
+    wrong = rows[~rows["kind"].isin(HITS)].assign(of=rows[by]).dropna(subset="share")
+    worst = wrong.sort_values("share", ascending=False, kind="stable").drop_duplicates("detector")
+    return Figure(figure, *texts("error_kinds", note=note, by=by, said=worst), table)
 
 
 @in_style
@@ -254,8 +251,7 @@ def gallery(
     told = {"note": note, "n": len(cases), "rows": list(dict.fromkeys(said))}
     name = "gallery" if row == "detector" else "lost_points"
     width = max(map(len, pictures.values()))
-    drawn = picture_grid(
-        list(pictures.values()), *texts(name, **told), list(pictures), cell_in=WIDTH_IN / width
-    )
+    grid = list(pictures.values()), *texts(name, **told), list(pictures)
+    drawn = picture_grid(*grid, cell_in=WIDTH_IN / width)
     title_pictures(drawn, titles, 7)
     return drawn
