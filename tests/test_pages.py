@@ -92,7 +92,7 @@ def test_no_page_loads_more_than_a_slow_line_carries(book):
     for path in book.rglob("*.html"):
         page = BeautifulSoup(path.read_text(), "html.parser")
         links = page.find_all("link", rel=["stylesheet", "preload"])
-        named = [tag["href"] for tag in links]
+        named = [str(tag["href"]) for tag in links]
         named += [
             tag["src"] for tag in page.find_all(["script", "img", "video"], src=re.compile("^(?!data:)"))
         ]
