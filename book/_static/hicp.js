@@ -36,16 +36,20 @@ document.addEventListener("DOMContentLoaded", () => {
   });
 
   // Only what is wider than its place takes part in the order of the Tab key; tables are told by their caption.
+  const tables = [...document.querySelectorAll(".hicp-table, .pst-scrollable-table-container")];
   const measure = new ResizeObserver((entries) => entries.forEach(({ target }) => {
     const caption = target.querySelector("caption");
     const isWider = target.scrollWidth > target.clientWidth;
     target.classList.toggle("hicp-wider", isWider);
-    const names = { tabindex: 0, ...(caption && { role: "region", "aria-label": `${caption.textContent} (scrolls)` }) };
+    const names = { tabindex: 0 };
+    if (caption) {
+      names.role = "region";
+      names["aria-label"] = `Table ${tables.indexOf(target) + 1}, scrolls: ${caption.textContent}`;
+    }
     Object.entries(names).forEach(([name, value]) => {
       if (isWider) target.setAttribute(name, value);
       else target.removeAttribute(name);
     });
   }));
-  document.querySelectorAll(".hicp-table, .pst-scrollable-table-container, pre, .hicp-formula")
-    .forEach((part) => measure.observe(part));
+  [...tables, ...document.querySelectorAll("pre, .hicp-formula")].forEach((part) => measure.observe(part));
 });

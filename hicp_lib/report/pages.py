@@ -3,8 +3,9 @@
 import re
 from functools import cache
 from pathlib import Path
+from typing import Any
 
-from bs4 import BeautifulSoup, Tag
+from bs4 import BeautifulSoup
 from PIL import Image
 
 _ICON = re.compile(r'[{,]"?([a-z][a-z0-9-]*)"?:\[(\d+),(\d+),\[[^\]]*\],"\w+","([^"]+)"\]')
@@ -28,10 +29,8 @@ def finish_page(page: BeautifulSoup, path: Path, book: Path) -> None:
         Where it lies; the files that it shows lie there already.
     book : Path
     """
-    # On every page the theme loads the search, and a megabyte for a dozen icons, which are put in as drawings.
-    unused = (
-        "fontawesome.js" if path.name == "search.html" else "fontawesome.js|searchindex|searchtools|language"
-    )
+    # The theme loads the search on every page, and a megabyte for a dozen icons, which become drawings.
+    unused = "fontawesome" + ("" if path.name == "search.html" else "|searchindex|searchtools|language_data")
     unused += "" if page.find(class_=re.compile("^sd-")) else "|sphinx-design"
     for tag in page.find_all(["script", "link"]):
         if re.search(unused, str(tag.get("src") or tag.get("href"))):
@@ -42,8 +41,8 @@ def finish_page(page: BeautifulSoup, path: Path, book: Path) -> None:
         _show_file(page, figure, path.parent)
     for table in page.find_all("table"):
         _name(page, table)
-    for toggle in page.find_all("span", class_="toctree-toggle"):
-        toggle.parent["aria-label"] = "Pages within"
+    for summary in page.find_all(lambda tag: tag.name == "summary" and tag.find(class_="toctree-toggle")):
+        summary["aria-label"] = "Pages within"
     if sidebar := page.find(id="pst-primary-sidebar"):
         sidebar.attrs |= {"role": "complementary", "aria-label": "Book"}
 
@@ -54,7 +53,7 @@ def _icons(script: Path) -> dict[str, list[str]]:
     return {name: of for name, *of in _ICON.findall(script.read_text())}
 
 
-def _draw(icon: Tag, script: Path) -> None:
+def _draw(icon: Any, script: Path) -> None:
     drawings = _icons(script)
     width, height, path = next(filter(None, (drawings.get(name[3:]) for name in icon["class"])))  # fa-NAME
     icon.name, icon["class"] = "svg", ["svg-inline--fa", *icon["class"]]
@@ -62,7 +61,7 @@ def _draw(icon: Tag, script: Path) -> None:
     icon.append(BeautifulSoup(f'<path fill="currentColor" d="{path}"></path>', "html.parser"))
 
 
-def _show_file(page: BeautifulSoup, figure: Tag, folder: Path) -> None:
+def _show_file(page: BeautifulSoup, figure: Any, folder: Path) -> None:
     """The file that lies beside the page in place of the copy within, and in full when asked for."""
     shown, link = figure.find(["img", "video"]), figure.find("a", download=True)
     if len(page.find_all(id=figure.get("id", ""))) > 1:
@@ -76,14 +75,13 @@ def _show_file(page: BeautifulSoup, figure: Tag, folder: Path) -> None:
     shown.wrap(page.new_tag("a", attrs={"class": "hicp-zoom", "href": shown["src"], "title": "Enlarge"}))
 
 
-def _name(page: BeautifulSoup, table: Tag) -> None:
+def _name(page: BeautifulSoup, table: Any) -> None:
     """A caption for those who hear the page: that of its figure, or the heading above it."""
     figure = table.find_parent("figure")
     named = figure.figcaption if figure else table.find_previous(["h1", "h2", "h3", "summary"])
     if table.caption is None and named is not None:
-        caption = page.new_tag("caption", attrs={"class": "visually-hidden"})
-        caption.string = named.contents[0].get_text()
-        table.insert(0, caption)
+        words = named.contents[0].get_text()
+        table.insert(0, page.new_tag("caption", attrs={"class": "visually-hidden"}, string=words))
     if table.parent.get("class") not in (["hicp-table"], ["pst-scrollable-table-container"]):
         table.wrap(page.new_tag("div", attrs={"class": "hicp-table"}))
     for empty in table.find_all("th"):
