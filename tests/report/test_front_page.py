@@ -199,6 +199,18 @@ def test_invented_heads_are_told_with_the_people_they_were_counted_on(run):
     assert "**No detector invented a head.**" in run.page()
 
 
+@pytest.mark.parametrize(("half", "alike"), [(0.1, False), (0.3, True), (None, True)])
+def test_invented_heads_are_told_apart_by_the_interval_of_their_difference(run, half, alike):
+    shares = {"a": 0.37, "mediapipe": 0.15, "combined:a+b": 0.37}
+    rows = [HEAD | {"detector": d, "decision": SURE, "n": 19} | between(v, half) for d, v in shares.items()]
+    run.values(FAILURES, heads_cut_off=19)
+    run.table(FAILURES, "false_presence", rows)
+    page = run.page()
+    (best,) = re.findall(r"\| no head invented \|([^|]*)\|", page)
+    assert ("not told apart: a" in best) == alike
+    assert page.count("37 %") == 1  # a combination's head is that of its body detector
+
+
 @pytest.mark.parametrize("floor", ["3.3 to 5.0", None])
 def test_in_space_stand_our_medians_the_papers_and_the_floor_where_it_is_known(run, floor):
     run.values(SPACE, data_note="2 people", floor_cm=floor)
