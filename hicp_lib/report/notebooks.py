@@ -12,7 +12,7 @@ from typing import Any
 
 import nbformat
 
-from hicp_lib.core.cache import digest, imports_of
+from hicp_lib.core.cache import digest, imports_of, syntax_tree
 from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import json_or_text, read_bytes
 
@@ -122,7 +122,7 @@ def _assignments(source: str, path: Path) -> dict[str, Any]:
     """Name -> value of `name = literal` lines. The text is parsed, never run."""
     values = {}
     try:
-        for statement in ast.parse(source).body:
+        for statement in syntax_tree(source).body:
             match statement:
                 case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
                     values[name] = ast.literal_eval(statement.value or "")

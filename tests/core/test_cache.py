@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import ast
+import gc
 import json
 import os
 import random
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hicp_lib.core import cache
-from hicp_lib.core.cache import LIBRARY_DIR, code, imports_of, key
+from hicp_lib.core.cache import LIBRARY_DIR, code, imports_of, key, syntax_tree
 from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.core.datafiles import DATA_DIR, REFERENCE_DIR
 from hicp_lib.core.errors import InputError
@@ -238,6 +240,24 @@ def test_what_is_imported_for_type_checks_alone_is_no_part():
         "def f():\n    from g import h\n"
     )
     assert imports_of(source) == {"typing", "typing.TYPE_CHECKING", "a.b", "e", "g", "g.h"}
+
+
+def test_code_is_parsed_by_several_threads_while_garbage_is_collected():
+    """Python's own parser then fails now and then: a callback of the collector lets another thread run."""
+    source = Path(imports_of.__code__.co_filename).read_text()
+    before = sys.getswitchinterval(), gc.get_threshold()
+    callback = lambda *_: sum(range(200))  # noqa: E731
+    gc.callbacks.append(callback)
+    sys.setswitchinterval(1e-6)
+    gc.set_threshold(50)
+    try:
+        with ThreadPoolExecutor(4) as threads:
+            trees = list(threads.map(syntax_tree, [source] * 60))
+    finally:
+        gc.callbacks.remove(callback)
+        sys.setswitchinterval(before[0])
+        gc.set_threshold(*before[1])
+    assert len(trees) == 60
 
 
 def test_a_key_is_the_same_in_every_process():
