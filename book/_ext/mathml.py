@@ -8,7 +8,11 @@ from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.util import logging
 
 # TeX that docutils does not know -> what it knows.
-_TEX = ((re.compile(r"\\([bB]ig)(?![a-zA-Z])"), r"\\\1l"), (re.compile(r"\\dots(?![a-zA-Z])"), r"\\ldots"))
+_TEX = (
+    (re.compile(r"\\([bB]ig)(?![a-zA-Z])"), r"\\\1l"),
+    (re.compile(r"\\dots(?![a-zA-Z])"), r"\\ldots"),
+    (re.compile(r"\\operatorname\*"), r"\\operatorname"),  # else the star is drawn
+)
 
 
 def setup(app: Any) -> dict[str, bool]:
