@@ -243,7 +243,7 @@ def test_the_robot_is_late_where_hardly_anybody_is_kept_away(run):
     assert " · simulated robot**" in page
     assert "**A simulated iCub gives way, mostly too late.**" in page
     assert "1.0 cm without avoidance, 3.0 cm with a and 6.0 cm with perfect keypoints" in page
-    assert "kept for 10 % and 40 % of these people" in page
+    assert "With a at least 5 cm are kept for 10 % of these people, with perfect keypoints for 40 %" in page
     run.table(ROBOT, "clearance", rows[:2])
     assert "iCub" not in run.page(), "no detector looked"
 
