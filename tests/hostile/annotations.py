@@ -150,5 +150,7 @@ def cases() -> Iterator[Case]:
     for kind, change in result_changes():
         make = partial(_change, "results.json", change)
         for reader in ("evaluate detections", "export", "draw detections", "import coco"):
-            yield Case(f"results: {reader}: {kind}", READERS[reader][0], make, exits=_exits(kind), notes=True)
+            # What is exported is not compared with images.
+            exits = (0,) if (reader, kind) == ("export", "an image nobody knows") else _exits(kind)
+            yield Case(f"results: {reader}: {kind}", READERS[reader][0], make, exits=exits, notes=True)
         yield Case(f"results: inspect: {kind}", "inspect results.json", make, exits=(0, 2))
