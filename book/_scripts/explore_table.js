@@ -51,7 +51,7 @@ function hicpFilter(tables) {
     type: "checkbox", checked: true,
     change: event => (shown[event.target.checked ? "add" : "delete"](figure), update()),
   }), ` ${figure.id.replaceAll("_", " ")}`));
-  const bar = hicpMake("div", {class: "hicp-explorer hicp-filter", role: "search", "aria-label": "Rows of the tables below"},
+  const bar = hicpMake("div", {class: "hicp-explorer hicp-filter", role: "search", "aria-label": `Rows of ${figures.map(figure => figure.id.replaceAll("_", " ")).join(", ")}`},
     hicpMake("label", {}, "Rows with ", text), ...(boxes.length > 1 ? boxes : []), count);
   figures[0].before(bar);
   update();
