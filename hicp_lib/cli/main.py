@@ -82,18 +82,19 @@ def run(arguments: list[str]) -> int:
     >>> run(["no-such-command"])
     2
     """
-    with redirect_stdout(_Shown(sys.stdout)), redirect_stderr(_Shown(sys.stderr)):
+    shown = _Shown(sys.stdout, kept="\n\t"), _Shown(sys.stderr, kept="\n\r\t")  # bars return to their start
+    with redirect_stdout(shown[0]), redirect_stderr(shown[1]):
         return _run(arguments)
 
 
 class _Shown:
     """A stream that escapes control characters, since names and messages may be external."""
 
-    def __init__(self, stream: Any) -> None:
-        self._stream = stream
+    def __init__(self, stream: Any, kept: str) -> None:
+        self._stream, self._kept = stream, kept
 
     def write(self, text: str) -> int:
-        self._stream.write(printable(text, kept="\n\r\t"))
+        self._stream.write(printable(text, kept=self._kept))
         return len(text)
 
     def __getattr__(self, name: str) -> Any:

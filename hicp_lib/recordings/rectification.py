@@ -11,6 +11,7 @@ from hicp_lib.core.errors import InputError
 
 # From undistorted to distorted pixels. librealsense's own functions treat inverse_brown_conrady the same way,
 # despite its name: they agree with this within 0.001 pixels, while the inverse differs by more than 5.
+_LEAST_SEEN = 0.5  # share of the undistorted image that the distorted one has to show
 _MODELS = ("plumb_bob", "brown_conrady", "inverse_brown_conrady", "rational_polynomial")
 
 
@@ -37,7 +38,7 @@ def undistortion(
     Raises
     ------
     InputError
-        If the distortion's model is not supported.
+        If the distortion's model is not supported, or it leaves hardly anything of the image.
 
     Examples
     --------
@@ -48,13 +49,17 @@ def undistortion(
     if not numbers.any():
         return None
     name = re.sub(r"\W+", "_", model.rpartition(".")[2].lower())
+    shown = np.array2string(numbers, precision=4, separator=", ")
     if name not in _MODELS or len(numbers) not in (4, 5, 8) or not np.isfinite(numbers).all():
-        shown = np.array2string(numbers, precision=4, separator=", ")
         known = f"what can be undone is {', '.join(_MODELS)} of 4, 5 or 8 numbers"
         raise InputError(f"{where}: distortion {model or 'without a model'} {shown}; {known}; undo it first")
     matrix = np.array([[camera.fx_px, 0, camera.cx_px], [0, camera.fy_px, camera.cy_px], [0, 0, 1]])
     size = camera.width_px, camera.height_px
-    return cv2.initUndistortRectifyMap(matrix, numbers, None, matrix, size, cv2.CV_32FC2)[0]
+    pixels_px = cv2.initUndistortRectifyMap(matrix, numbers, None, matrix, size, cv2.CV_32FC2)[0]
+    if (share := camera.contains(pixels_px).mean()) < _LEAST_SEEN:
+        problem = f"distortion {shown} leaves {share:.0%} of the image"
+        raise InputError(f"{where}: {problem}; check the coefficients and the intrinsics")
+    return pixels_px
 
 
 def rectify(image: np.ndarray, pixels_px: np.ndarray | None) -> np.ndarray:

@@ -112,10 +112,10 @@ def test_what_a_terminal_obeys_is_shown(capsys, name):
 
 
 def test_what_a_terminal_obeys_is_shown_in_results_too(capsys, tmp_path):
-    (tmp_path / "a\x07b").mkdir()
-    assert cli.run(["record", "check", str(tmp_path / "a\x07b")]) == 2
+    (tmp_path / "a\x07b\rc").mkdir()
+    assert cli.run(["record", "check", str(tmp_path / "a\x07b\rc")]) == 2
     printed = capsys.readouterr().out
-    assert "a\\x07b" in printed and "\x07" not in printed
+    assert "a\\x07b\\rc" in printed and "\x07" not in printed and "\r" not in printed
 
 
 def test_what_a_command_reads_is_not_written_over(capsys, tmp_path, two_images):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from hicp_lib.core.camera import Camera
-from hicp_lib.recordings.rectification import align_depth
+from hicp_lib.core.errors import InputError
+from hicp_lib.recordings.rectification import align_depth, undistortion
 
 DEPTH = Camera(8, 6, 8.0, 8.0, 3.5, 2.5)
 
@@ -34,3 +36,9 @@ def test_the_nearest_surface_hides_the_other():
 
 def test_nothing_seen_is_nothing():
     assert not align_depth(np.zeros((6, 8)), DEPTH, DEPTH, np.eye(4)).any()
+
+
+def test_a_distortion_that_leaves_nothing_of_the_image_is_refused():
+    with pytest.raises(InputError, match=r"rec/info: distortion .* leaves 0% of the image"):
+        undistortion("rec/info", DEPTH, "plumb_bob", [1e30, 0, 0, 0, 0])
+    assert undistortion("rec/info", DEPTH, "plumb_bob", [-0.3, 0.1, 0, 0, 0]).shape[-1] == 2
