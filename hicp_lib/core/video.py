@@ -52,7 +52,7 @@ def _decode(path: str) -> Iterator[bytes]:
     """How many frames a video says it has, then each with its time and shape."""
     capture = cv2.VideoCapture(path)
     if not capture.isOpened():
-        raise InputError(f"{path}: is no video that OpenCV can read; give .mp4, .avi or .mov, or images")
+        raise InputError(f"{path}: is not a video that OpenCV can read; give .mp4, .avi or .mov, or images")
     sides_px = [int(capture.get(of)) for of in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)]
     refuse_too_large(path, *sides_px)
     yield b"%d" % max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
