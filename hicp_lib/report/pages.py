@@ -63,12 +63,12 @@ def _draw(icon: Any, script: Path) -> None:
 
 def _show_file(page: BeautifulSoup, figure: Any, folder: Path) -> None:
     """The file that lies beside the page in place of the copy within, and in full when asked for."""
-    shown, link = figure.find(["img", "video"]), figure.find("a", download=True)
+    shown, link = figure.find("img"), figure.find("a", download=True)
     if len(page.find_all(id=figure.get("id", ""))) > 1:
         del figure["id"]  # a heading has it, and is a line above
     if shown is not None and link is not None:
         shown["src"] = link["href"]
-    if shown is None or shown.name == "video" or shown["src"].startswith("data:"):
+    if shown is None or shown["src"].startswith("data:"):
         return
     with Image.open(folder / shown["src"]) as image:
         shown.attrs |= dict(zip(("width", "height"), image.size, strict=True)) | {"loading": "lazy"}

@@ -53,7 +53,7 @@ def crops(
     families: dict[str, dict[str, Annotations]] = {}
     for subset, annotations in truth.items():
         families.setdefault("pair" if subset in SAME_PEOPLE else subset, {})[subset] = annotations
-    fits = {case: rows for case, rows in oks.groupby(["subset", "image_id"], sort=False)}
+    fits = dict(iter(oks.groupby(["subset", "image_id"], sort=False)))
     people, files = [], {}
     for family in families.values():
         for image_id in spread({i for annotations in family.values() for i in annotations.images}, n_people):

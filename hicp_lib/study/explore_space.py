@@ -58,11 +58,11 @@ def runs(chosen: Iterable[Run], n_people: int = 4) -> Explored:
         if person > n_people:
             continue
         films.append({"script": trial.script, "person": person, "detector": run.job.condition})
-        frames = [frame for _, frame in run.frames.iterrows()]
+        frames = [(frame, image(frame)) for _, frame in run.frames.iterrows()]
         every = max(1, round(_STEP_S / run.cycles["t_s"].diff().median()))
         steps = [_step(cycle) for _, cycle in run.cycles.iloc[::every].iterrows()]
-        files[f"{name}.js"] = as_script({"frames": list(map(_seen, frames)), "steps": steps})
-        files[f"{name}.webp"] = _sheet([image(frame)[0] for frame in frames])
+        files[f"{name}.js"] = as_script({"frames": [_seen(*of) for of in frames], "steps": steps})
+        files[f"{name}.webp"] = _sheet([rgb for _, (rgb, _) in frames])
     radii_mm = [round(1000 * segment.radius_m) for segment in body_segments(load_icub(), start_posture())]
     return _films(films, [_PERCEIVED]) | {"radii": radii_mm}, files
 
@@ -112,8 +112,8 @@ def _films(films: list[dict[str, Any]], bodies: Sequence[str]) -> dict[str, Any]
     return styles(film["detector"] for film in films) | shown
 
 
-def _seen(frame: pd.Series) -> dict[str, Any]:
-    (rgb, found), (points_m, is_sure, truth_m) = image(frame), sure_keypoints(frame)
+def _seen(frame: pd.Series, picture: tuple[np.ndarray, Detections]) -> dict[str, Any]:
+    (rgb, found), (points_m, is_sure, truth_m) = picture, sure_keypoints(frame)
     bodies = {TRUTH: _body(truth_m), _PERCEIVED: flat(1000 * points_m, is_sure.astype(float), 0)}
     return {"t_s": round(frame["t_s"], 3), "found": _in_picture(found, rgb.shape[1]), "bodies": bodies}
 

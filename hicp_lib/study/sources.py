@@ -147,8 +147,9 @@ def _rendered(n_scenes: int, seed: int, near: bool = False) -> tuple[Path, Path]
     made_by = ["hicp_lib.simulation.world.scenes", *(["hicp_lib.experiments.near"] if near else [])]
     folder = cache_dir() / "scenes" / key(made_by, n=n_scenes, seed=seed)[:16]
     if not (folder / "annotations.json").is_file():
-        from hicp_lib.experiments.near import near_stage, random_stage  # Open3D takes a second to load
+        from hicp_lib.experiments.near import near_stage  # Open3D takes a second to load
         from hicp_lib.simulation.world.scenes import render_dataset
+        from hicp_lib.simulation.world.staging import random_stage
 
         shown, staged = sys.stderr.isatty(), near_stage if near else random_stage
         render_dataset(folder, n=n_scenes, seed=seed, progress=shown, staged=staged)

@@ -5,8 +5,8 @@ import pandas as pd
 
 from hicp_lib.evaluation.ap.loss_shares import SHARES
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.evaluation import WIDTH_IN, dots_by_subset, extreme
-from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
+from hicp_lib.study.plots.evaluation import dots_by_subset, extreme
+from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_style, new_figure, texts
 
 
 @in_style

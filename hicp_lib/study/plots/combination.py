@@ -3,9 +3,8 @@
 import pandas as pd
 
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.evaluation import WIDTH_IN
 from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.style import Figure, in_lines, in_style, new_figure, texts
+from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_lines, in_style, new_figure, texts
 
 _MEASURES = {"AP": "average precision of hands", "share": "share of hands found"}
 _GROUPS = {"hand": "hands"}
@@ -54,19 +53,15 @@ def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, min_term: flo
     note : str
         What the data are, for the caption.
     """
-    cases = list(dict.fromkeys(zip(curves["detector"], curves["group"], strict=True)))
-    n_rows = -(-len(cases) // 2)
-    shared = {"sharex": True, "sharey": True, "squeeze": False}
-    figure, axes = new_figure(n_rows, 2, WIDTH_IN, 2.5 * n_rows + 0.5, **shared)
-    for axis, (detector, group) in zip(axes.flat, cases, strict=False):
-        rows = curves[(curves["detector"] == detector) & (curves["group"] == group)]
-        _draw_curves(axis, rows[rows["count"] >= _FEWEST], detector_colour(detector))
-        axis.set_title(
-            f"{in_lines(detector.removeprefix('combined:'))}:\n{_GROUPS.get(group, group)}", fontsize=8
-        )
+    names = curves["detector"].str.removeprefix("combined:").map(in_lines)
+    rows = curves.assign(case=names + ":\n" + curves["group"].replace(_GROUPS))
+    height_in = 2.5 * -(-rows["case"].nunique() // 2) + 0.5
+    figure, axes, panels = marks.panels(rows, ["case"], WIDTH_IN, height_in, wrap=2, sharex=True, sharey=True)
+    for axis, of_case, case in panels:
+        colour = detector_colour(of_case["detector"].iloc[0])
+        _draw_curves(axis, of_case[of_case["count"] >= _FEWEST], colour)
+        axis.set_title(case, fontsize=8)
         axis.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
-    for axis in axes.flat[len(cases) :]:
-        axis.set_axis_off()
     for axis in axes[:, 0]:
         axis.set(ylabel="share of hits")
     for axis in axes[-1]:

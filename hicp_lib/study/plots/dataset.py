@@ -16,10 +16,9 @@ from hicp_lib.formats.annotations import Annotations
 from hicp_lib.simulation.body.joints import pose_from_joints, radians
 from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.evaluation import WIDTH_IN
 from hicp_lib.study.plots.palette import BODY_COLOUR, HEAD_COLOUR, SUBSET_COLOURS
 from hicp_lib.study.plots.people import draw_truth, picture_grid
-from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
+from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_style, new_figure, texts
 
 _TRUTH_COLOUR = "#F0E442"
 _EDGES = ("left", "top", "right", "bottom")

@@ -11,10 +11,9 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.evaluation import WIDTH_IN
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
 from hicp_lib.study.plots.people import draw_detections, picture_grid, title_pictures
-from hicp_lib.study.plots.style import TEXTS, Figure, in_style, new_figure, texts
+from hicp_lib.study.plots.style import TEXTS, WIDTH_IN, Figure, in_style, texts
 
 _UNITS = {"distance": "{:g} m", "resolution": "{:g} px"}
 _LOGARITHMIC = ("light", "resolution", "distance")
@@ -81,11 +80,9 @@ def dose_curves(table: pd.DataFrame, group: str, measure: str = "AP") -> Figure:
     table = table[table["group"] == group]
     rows = table[table["measure"] == measure].astype({"low": float, "high": float})
     rows = marks.own_bodies(rows) if group == "body" else rows
-    n_rows = -(-rows["dose"].nunique() // 2)
-    figure, axes = new_figure(n_rows, 2, WIDTH_IN, 1.9 * n_rows + 0.5, sharey=True, squeeze=False)
-    for axis in axes.flat[rows["dose"].nunique() :]:
-        axis.set_axis_off()
-    for axis, (dose, of_dose) in zip(axes.flat, rows.groupby("dose", sort=False), strict=False):
+    height_in = 1.9 * -(-rows["dose"].nunique() // 2) + 0.5
+    figure, axes, panels = marks.panels(rows, ["dose"], WIDTH_IN, height_in, wrap=2, sharey=True)
+    for axis, of_dose, dose in panels:
         for detector, part in of_dose.groupby("detector", sort=False):
             part, colour = part.sort_values("level"), detector_colour(detector)
             pen = {"marker": detector_marker(detector), "ms": 5, "label": detector}

@@ -9,10 +9,9 @@ from hicp_lib.evaluation.ap.found_and_placed import FOUND, OKS_OF_FOUND
 from hicp_lib.study.photographs import PHOTOGRAPHED, RENDERED
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
-from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
+from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_style, new_figure, texts
 
 GROUP_TITLES = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
-WIDTH_IN = 5.5  # what can be read on a telephone, and fills a page
 # By OKS threshold: precision, recall, and how much of a marker is filled.
 _THRESHOLDS = {
     ".5": ("AP50", "AR50", "none"), ".75": ("AP75", "AR75", "left"), ".5:.95": ("AP", "AR", "full"),

@@ -8,9 +8,8 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
 from hicp_lib.formats.annotations import Annotations
-from hicp_lib.study.plots.evaluation import WIDTH_IN
 from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
-from hicp_lib.study.plots.style import Figure, texts
+from hicp_lib.study.plots.style import WIDTH_IN, Figure, texts
 
 _MIN_SCORE = 0.1  # of keypoints that are drawn
 

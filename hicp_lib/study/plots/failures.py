@@ -18,10 +18,10 @@ from hicp_lib.evaluation.failures.without_head import HEAD_POINTS
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.inspection.skeletons import draw_rings
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.evaluation import GROUP_TITLES, WIDTH_IN
+from hicp_lib.study.plots.evaluation import GROUP_TITLES
 from hicp_lib.study.plots.palette import detector_colour
 from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid, title_pictures
-from hicp_lib.study.plots.style import Figure, in_lines, in_style, new_figure, texts
+from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_lines, in_style, new_figure, texts
 
 _TRUTH_COLOUR = "#39D353"
 _ONE_CROP = ["subset", "image_id", "annotation_id"]

@@ -15,7 +15,7 @@ OTHER_COLOUR, _OTHER_MARKER = "#595959", "."
 
 # The two subsets of HiCP and the near one, and the two boxes of the paper's figure of how they are made.
 SUBSET_COLOURS = {"basic": "#0072B2", "headless": "#D55E00", "near": "#009E73"}
-SUBSET_MARKERS = {"basic": "o", "headless": "s", "near": "^"}
+SUBSET_MARKERS = {"basic": "o", "headless": "s", "near": "D"}
 HEAD_COLOUR = "#D5272D"
 BODY_COLOUR = "#1B9E4B"
 

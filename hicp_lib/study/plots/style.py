@@ -16,6 +16,8 @@ from hicp_lib.core.datafiles import DATA_DIR
 _STYLE = DATA_DIR / "report.mplstyle"
 COLUMN_IN = 6.4
 """Width of a figure [in] whose 9 pt stay 9 pt or more in a page's column of 672 px."""
+WIDTH_IN = 5.5
+"""Width of a figure [in] that is read on a telephone, too; a page's column enlarges it."""
 TEXTS = tomllib.loads((DATA_DIR / "captions.toml").read_text("utf-8"))
 """Captions and alternative texts of figures by name (`texts`), and labels of axes."""
 
