@@ -9,7 +9,7 @@ extremely inexpensive multisampling scheme", 2003); its centre is a fifth sample
 import numpy as np
 
 from hicp_lib.simulation.rendering.camera import PlacedCamera, join_rays, ray_parts
-from hicp_lib.simulation.rendering.raycast import DEPTH_STEP, RayScene, Trace
+from hicp_lib.simulation.rendering.raycast import DEPTH_STEP, RayScene, Trace, dot
 
 _SHIFT_PX = 0.17  # along the border, from its middle
 
@@ -107,6 +107,8 @@ def _difference(trace: Trace, pixels: np.ndarray, found: Trace, scene: RayScene)
     depth = np.minimum(found.depth_m, np.float32(1e3))
     cost = np.abs(np.minimum(trace.depth_m.take(pixels), np.float32(1e3)) - depth) / depth
     cost += 10 * (trace.surface.take(pixels) != found.surface)
-    triangles = trace.triangle.take(pixels), found.triangle
-    faces = [scene.face_normals.take(triangle, axis=0, mode="wrap") for triangle in triangles]
-    return cost + np.float32(0.04) * (1 - np.einsum("ij,ij->i", *faces))
+    seen, met = (
+        scene.face_normals.take(triangle, axis=1, mode="wrap")
+        for triangle in (trace.triangle.take(pixels), found.triangle)
+    )
+    return cost + np.float32(0.04) * (1 - dot(seen, met))

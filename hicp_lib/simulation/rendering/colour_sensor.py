@@ -8,6 +8,7 @@ import numpy as np
 from hicp_lib.core.memo import memoised
 
 _TILE_PX = 1536
+_N_TONES = 4096  # in the table of the tone curve
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of linear sRGB
 
 
@@ -76,16 +77,15 @@ def expose(
     np.True_
     """
     height, width = radiance.shape[:2]
-    gains = np.diag(sensor.white_balance * _auto_exposure(radiance, meter) * sensor.exposure)
-    light = cv2.transform(radiance, gains.astype(np.float32))
+    gains = sensor.white_balance * _auto_exposure(radiance, meter) * sensor.exposure
     y = np.linspace(-1, 1, height, dtype=np.float32)[:, None]
     x = np.linspace(-1, 1, width, dtype=np.float32)[None, :]
-    light = cv2.multiply(light, cv2.merge([1 - np.float32(sensor.vignette * 0.5) * (x * x + y * y)] * 3))
-    light = cv2.GaussianBlur(light, (0, 0), max(sensor.blur_px, 0.2))
-    variance = np.maximum(light, 0)
-    variance *= np.float32(sensor.shot_noise**2)
+    lens = 1 - np.float32(sensor.vignette * 0.5) * (x * x + y * y)
+    light = cv2.GaussianBlur(radiance, (0, 0), max(sensor.blur_px, 0.2))
+    light = cv2.multiply(light, cv2.merge([lens * np.float32(gain) for gain in gains]))
+    variance = light * np.float32(sensor.shot_noise**2)
     variance += np.float32(sensor.read_noise**2)
-    light += cv2.sqrt(variance) * _noise(height, width, rng)
+    light += cv2.multiply(cv2.sqrt(variance), _noise(height, width, rng))
     saturate = sensor.saturation * np.eye(3) + (1 - sensor.saturation) * _LUMINANCE
     return _tone(cv2.transform(light, saturate.astype(np.float32)), sensor.contrast)
 
@@ -102,8 +102,7 @@ def _noise(height: int, width: int, rng: np.random.Generator) -> np.ndarray:
     """A random piece of the noise tile, (height, width, 3); new noise would cost more than shading."""
     tile = _noise_tile()
     row, column = (rng.integers(0, _TILE_PX - size + 1) for size in (height, width))
-    piece = tile[row : row + height, column : column + width]
-    return piece[:: rng.choice([-1, 1]), :: rng.choice([-1, 1])]
+    return cv2.flip(tile[row : row + height, column : column + width], int(rng.integers(-1, 2)))
 
 
 def _auto_exposure(radiance: np.ndarray, meter: np.ndarray | None) -> float:
@@ -117,10 +116,11 @@ def _auto_exposure(radiance: np.ndarray, meter: np.ndarray | None) -> float:
 
 def _tone(light: np.ndarray, contrast: float) -> np.ndarray:
     """Linear light to sRGB with a shoulder that rolls highlights off, through a table."""
-    x = np.linspace(0, 4, 4096)
+    x = np.linspace(0, 4, _N_TONES)
     # Keeps middle grey, rolls off to white at 4.
     shoulder = np.clip(1.156 * x * (1 + x / 36) / (1 + 0.9 * x), 0, 1)
     srgb = np.where(shoulder <= 0.0031308, 12.92 * shoulder, 1.055 * shoulder ** (1 / 2.4) - 0.055)
     curved = 0.5 + 0.5 * np.tanh(contrast * 2 * (srgb - 0.46)) / np.tanh(contrast)
     table = np.clip(255 * (0.35 * curved + 0.65 * srgb) + 0.5, 0, 255).astype(np.uint8)
-    return table[np.clip(light * np.float32(4095 / 4), 0, 4095).astype(np.int16)]
+    levels = cv2.multiply(light, np.ones(1), scale=(_N_TONES - 1) / 4, dtype=cv2.CV_16U)  # from 0
+    return table.take(levels, mode="clip")

@@ -10,42 +10,40 @@ from hicp_lib.simulation.rendering.raycast import DEPTH_STEP, cross, dot
 _OFF_PLANE_M = 0.012  # from the tangent plane of a pixel's surface: further away counts as another surface
 
 
-def tilt_by_height(normals: np.ndarray, height_m: np.ndarray, gbuffer: GBuffer) -> None:
-    """Tilt normals by the slope of bumps.
+def tilt_by_height(normals: np.ndarray, height_m: np.ndarray, gbuffer: GBuffer) -> np.ndarray:
+    """Normals tilted by the slope of bumps.
 
     Mikkelsen, "Bump mapping unparametrized surfaces on the GPU" (2010); pixels on the last
     row and column, without height or beside another surface keep their normals.
 
     Parameters
     ----------
-    normals : array, shape (3, rows, columns)
-        Changed in place.
-    height_m : array, shape (rows, columns)
+    normals : array, shape (3, n)
+    height_m : array, shape (n,)
         Of the bumps.
     gbuffer : GBuffer
-        Of the same rows and columns.
+        Of the same pixels.
+
+    Returns
+    -------
+    array, shape (3, n)
     """
-    here, right, below = np.s_[:-1, :-1], np.s_[:-1, 1:], np.s_[1:, :-1]
-    surface, depth = gbuffer.surface, gbuffer.depth_m
-    step = DEPTH_STEP * depth[here]
-    inner = (
-        (height_m[here] != 0)
-        & (surface[here] == surface[right]) & (surface[here] == surface[below])
-        & (np.abs(depth[right] - depth[here]) < step) & (np.abs(depth[below] - depth[here]) < step)
-    )  # fmt: skip
-    n, position = normals[:, *here], gbuffer.positions_m[:, *here]
-    rx = cross(gbuffer.positions_m[:, *below] - position, n)
-    dx = gbuffer.positions_m[:, *right] - position
-    ry = cross(n, dx)
-    area = dot(dx, rx)
-    rx *= height_m[right] - height_m[here]
-    ry *= height_m[below] - height_m[here]
-    rx += ry
-    rx *= np.sign(area)
-    tilted = np.abs(area) * n
-    tilted -= rx
+    trace, (rows, columns), pixels = gbuffer.view.trace, gbuffer.view.shape, gbuffer.pixels
+    heights = np.zeros(rows * columns, np.float32)
+    heights[pixels] = height_m
+    step_m, slopes, beside = DEPTH_STEP * gbuffer.depth_m, [], []
+    inner = (height_m != 0) & (pixels < (rows - 1) * columns) & (pixels % columns < columns - 1)
+    for near in (pixels + 1, pixels + columns):
+        inner &= trace.surface.take(near, mode="clip") == trace.surface.take(pixels)
+        inner &= np.abs(trace.depth_m.take(near, mode="clip") - gbuffer.depth_m) < step_m
+        slopes.append(heights.take(near, mode="clip") - height_m)
+        beside.append(gbuffer.view.offsets_m(near) - gbuffer.offsets_m)
+    (right, below), (rise_right, rise_below) = beside, slopes
+    area = dot(right, cross(below, normals))
+    tilted = np.abs(area) * normals
+    tilted -= np.sign(area) * cross(rise_right * below - rise_below * right, normals)
     tilted /= np.maximum(np.sqrt(dot(tilted, tilted)), np.float32(1e-20))
-    np.copyto(n, tilted, where=inner)
+    return np.where(inner, tilted, normals)
 
 
 def sum_within(

@@ -1,79 +1,110 @@
-"""The G-buffer: geometry and material of what each pixel shows, where its ray met it."""
+"""The G-buffer: geometry and material of what pixels show, where their rays met it."""
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 
-from hicp_lib.simulation.rendering.raycast import RayScene, Trace, dot, interpolate, pick, place
+from hicp_lib.simulation.rendering.raycast import RayScene, Trace, dot, interpolate, pick
 from hicp_lib.simulation.rendering.surfaces import Look
 
 
 @dataclass(frozen=True)
-class GBuffer:
-    """Geometry seen at a grid of an image's pixels, of which n are to be shaded.
+class View:
+    """What the rays through a grid of pixels met.
 
     Attributes
     ----------
-    pixels : array of int, shape (n,)
-        Numbers of the n pixels in the grid, row by row.
-    surface : array, shape (rows, columns), dtype int16
-        What is seen, -1 at pixels that are not to be shaded.
-    depth_m : array, shape (rows, columns)
-    positions_m : array, shape (3, rows, columns)
-        Of what is seen, world frame.
-    directions : array, shape (3, n)
-        Of the n pixels' rays.
-    triangle, barycentric : array, shape (n,) and (n, 2)
-        What they met, as in `Trace`.
+    trace : Trace
+        Of the pixels, row by row.
+    centre_m : array, shape (3,)
+        Where the rays begin, world frame.
+    directions : array, shape (3, rows, columns), dtype float32
     """
 
-    pixels: np.ndarray
-    surface: np.ndarray
-    depth_m: np.ndarray
-    positions_m: np.ndarray
+    trace: Trace
+    centre_m: np.ndarray
     directions: np.ndarray
-    triangle: np.ndarray
-    barycentric: np.ndarray
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.directions.shape[1:]
+
+    def offsets_m(self, pixels: np.ndarray) -> np.ndarray:
+        """From the centre to what is seen at pixels (n,), (3, n)."""
+        return self.trace.depth_m.take(pixels, mode="clip") * pick(self.directions.reshape(3, -1), pixels)
+
+
+@dataclass(frozen=True)
+class GBuffer:
+    """Geometry seen at n of a view's pixels, surface by surface.
+
+    Attributes
+    ----------
+    view : View
+    pixels : array of int, shape (n,)
+        Their numbers in the view, row by row.
+    parts : dict of slice
+        Of the n pixels, those that show a surface, by its number.
+    """
+
+    view: View
+    pixels: np.ndarray
+    parts: dict[int, slice]
 
     @classmethod
-    def of(
-        cls, trace: Trace, centre_m: np.ndarray, directions: np.ndarray, part: tuple[slice, slice], wanted
-    ) -> "GBuffer":
-        """Some rows and columns of an image, and of these what is wanted.
+    def of(cls, view: View, wanted: np.ndarray) -> "GBuffer":
+        """Of the pixels that are `wanted`, (rows, columns), and show something."""
+        pixels = np.flatnonzero(wanted.ravel() & (view.trace.surface >= 0))
+        surface = view.trace.surface.take(pixels)
+        order = np.argsort(surface, kind="stable")
+        numbers, starts = np.unique(surface.take(order), return_index=True)
+        ends = [*starts[1:].tolist(), len(pixels)]
+        parts = {int(k): slice(int(a), b) for k, a, b in zip(numbers, starts, ends, strict=True)}
+        return cls(view, pixels.take(order), parts)
 
-        Parameters
-        ----------
-        trace : Trace
-            Of the whole image's rays.
-        centre_m : array, shape (3,)
-            Where the rays begin.
-        directions : array, shape (3, height, width)
-        part : tuple of slice
-            Rows and columns.
-        wanted : array of bool, shape (height, width)
-            Where nothing was hit, nothing is wanted.
-        """
-        surface, depth_m, triangle, barycentric = (
-            values.reshape(*wanted.shape, *values.shape[1:])[part]
-            for values in (trace.surface, trace.depth_m, trace.triangle, trace.barycentric)
-        )
-        surface = np.where(wanted[part], surface, np.int16(-1))
-        pixels = np.flatnonzero(surface.ravel() >= 0)
-        depth_m = np.where(surface >= 0, depth_m, np.float32(0))
-        rays = np.ascontiguousarray(directions[:, *part])
-        positions_m = depth_m * rays + centre_m.astype(np.float32)[:, None, None]
-        met = triangle.ravel().take(pixels), barycentric.reshape(-1, 2).take(pixels, axis=0)
-        return cls(pixels, surface, depth_m, positions_m, pick(rays.reshape(3, -1), pixels), *met)
+    @cached_property
+    def directions(self) -> np.ndarray:
+        """Of the pixels' rays, (3, n)."""
+        return pick(self.view.directions.reshape(3, -1), self.pixels)
 
-    def on_grid(self, values: np.ndarray) -> np.ndarray:
-        """Values of the n pixels (k, n) on the grid, (k, rows, columns), zero elsewhere."""
-        grid = np.zeros((len(values), self.surface.size), np.float32)
-        place(grid, self.pixels, values)
-        return grid.reshape(-1, *self.surface.shape)
+    @cached_property
+    def offsets_m(self) -> np.ndarray:
+        """From the view's centre to what is seen, (3, n)."""
+        return self.depth_m * self.directions
 
-    def from_grid(self, grid: np.ndarray) -> np.ndarray:
-        """Values of the n pixels, (k, n), from the grid's (k, rows, columns)."""
-        return pick(grid.reshape(len(grid), -1), self.pixels)
+    @property
+    def positions_m(self) -> np.ndarray:
+        """Of what is seen, world frame, (3, n)."""
+        return self.offsets_m + self.view.centre_m[:, None]
+
+    @cached_property
+    def depth_m(self) -> np.ndarray:
+        """Along the camera's z axis, (n,)."""
+        return self.view.trace.depth_m.take(self.pixels)
+
+    @cached_property
+    def triangle(self) -> np.ndarray:
+        """Number of the triangle that each ray met, (n,)."""
+        return self.view.trace.triangle.take(self.pixels)
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """Of the triangles' corners where the rays met them, (n, 3), float32."""
+        weights = np.empty((len(self.pixels), 3), np.float32)
+        weights[:, 1:] = self.view.trace.barycentric.take(self.pixels, axis=0)
+        np.subtract(1 - weights[:, 1], weights[:, 2], out=weights[:, 0])
+        return weights
+
+    def normals(self, scene: RayScene) -> np.ndarray:
+        """Interpolated between vertices; they face the camera, (3, n)."""
+        normals = interpolate(scene.normals, scene.triangles.take(self.triangle, axis=0), self.weights)
+        # Cloth and leaves are seen from both sides.
+        away = dot(pick(scene.face_normals, self.triangle), self.directions) > 0
+        scale = 1 / np.maximum(np.sqrt(dot(normals, normals)), np.float32(1e-9))
+        normals *= np.where(away, -scale, scale)
+        return normals
 
 
 @dataclass(kw_only=True)
@@ -86,23 +117,15 @@ class Shading(Look):
         """Some of the pixels."""
         return Shading(**{name: values[..., block] for name, values in vars(self).items()})
 
-    def put(self, rows: np.ndarray, look: Look) -> None:
-        """What one surface looks like at some of the pixels."""
-        for name, value in vars(look).items():
-            target = getattr(self, name)
-            if target.ndim == 2 and np.ndim(value):
-                place(target, rows, value)
-            elif np.ndim(value) or value:
-                target[rows] = value
 
-
-def evaluate_materials(scene: RayScene, gbuffer: GBuffer, pixel_rad: float) -> Shading:
-    """Interpolated normals, which face the camera, and what the materials look like.
+def evaluate_materials(scene: RayScene, gbuffer: GBuffer, normals: np.ndarray, pixel_rad: float) -> Shading:
+    """What the materials look like where rays met them.
 
     Parameters
     ----------
     scene : RayScene
     gbuffer : GBuffer
+    normals : array, shape (3, n)
     pixel_rad : float
         How wide a pixel is, seen from the camera.
 
@@ -112,32 +135,15 @@ def evaluate_materials(scene: RayScene, gbuffer: GBuffer, pixel_rad: float) -> S
         Of the G-buffer's n pixels.
     """
     n = len(gbuffer.pixels)
-    corners = np.ascontiguousarray(scene.triangles.take(gbuffer.triangle, axis=0).T, np.intp)
-    second, third = gbuffer.barycentric.T
-    weights = np.stack([1 - second - third, second, third])
-    colours = ("albedo", "glow")
-    empty = {f.name: np.zeros((3, n) if f.name in colours else n, np.float32) for f in fields(Look)}
-    shading = Shading(normals=_normals(scene, gbuffer, corners, weights), **empty)
-    surface = gbuffer.surface.ravel().take(gbuffer.pixels)
-    footprint_m = gbuffer.depth_m.ravel().take(gbuffer.pixels) * np.float32(pixel_rad)
-    order = np.argsort(surface, kind="stable")
-    bounds = np.searchsorted(surface, np.arange(len(scene.surfaces) + 1), sorter=order)
-    for number in np.flatnonzero(np.diff(bounds)):
-        rows = order[bounds[number] : bounds[number + 1]]
-        material = scene.surfaces[number].material
-        if not isinstance(material, Look):
-            local = pick(corners, rows) - scene.first_vertex[number]
-            coords = np.ascontiguousarray(scene.surfaces[number].mesh.coords.T, np.float32)
-            seen = interpolate(coords, local, pick(weights, rows))
-            material = material(seen, footprint_m.take(rows))
-        shading.put(rows, material)
+    empty = {f.name: np.zeros((3, n) if f.name in ("albedo", "glow") else n, np.float32) for f in fields(Look)}
+    shading = Shading(normals=normals, **empty)
+    for number, part in gbuffer.parts.items():
+        surface = scene.surfaces[number]
+        look = surface.material
+        if not isinstance(look, Look):
+            corners = surface.mesh.triangles.take(gbuffer.triangle[part] - scene.first_triangle[number], axis=0)
+            coords = interpolate(surface.mesh.coords, corners, gbuffer.weights[part])
+            look = look(coords, gbuffer.depth_m[part] * np.float32(pixel_rad))
+        for name, value in vars(look).items():
+            getattr(shading, name)[..., part] = value
     return shading
-
-
-def _normals(scene: RayScene, gbuffer: GBuffer, corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    normals = interpolate(scene.normals, corners, weights)
-    # Cloth and leaves are seen from both sides.
-    away = dot(scene.face_normals.take(gbuffer.triangle, axis=0).T, gbuffer.directions) > 0
-    scale = 1 / np.maximum(np.sqrt(dot(normals, normals)), np.float32(1e-9))
-    normals *= np.where(away, -scale, scale)
-    return normals

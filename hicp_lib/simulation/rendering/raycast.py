@@ -7,6 +7,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
 
 from hicp_lib.core.environment import with_variables
 from hicp_lib.simulation.rendering.camera import join_rays
@@ -62,30 +63,31 @@ class RayScene:
     def __init__(self, surfaces: list[Surface]):
         self.surfaces = surfaces
         n_triangles = [len(s.mesh.triangles) for s in surfaces]
-        self.first_vertex = np.cumsum([0, *(len(s.mesh.vertices_m) for s in surfaces)])
+        self.first_triangle = np.cumsum([0, *n_triangles])
+        first_vertex = np.cumsum([0, *(len(s.mesh.vertices_m) for s in surfaces)])
         # One more for "no triangle", -1.
         self.surface_of_triangle = np.append(
             np.repeat(np.arange(len(surfaces), dtype=np.int16), n_triangles), np.int16(-1)
         )
         self.vertices_m = np.concatenate([s.mesh.vertices_m for s in surfaces], dtype=np.float32)
         self.triangles = np.concatenate(
-            [s.mesh.triangles + first for s, first in zip(surfaces, self.first_vertex, strict=False)]
+            [s.mesh.triangles + first for s, first in zip(surfaces, first_vertex, strict=False)]
         ).astype(np.uint32)
         self._scene = o3d.t.geometry.RaycastingScene(nthreads=N_THREADS)
         self._scene.add_triangles(_tensor(self.vertices_m), _tensor(self.triangles))
 
     @cached_property
     def normals(self) -> np.ndarray:
-        """Of all vertices, (3, n_vertices)."""
-        return np.concatenate([s.mesh.normals.T for s in self.surfaces], axis=1, dtype=np.float32)
+        """Of all vertices, (n_vertices, 3)."""
+        return np.concatenate([s.mesh.normals for s in self.surfaces], dtype=np.float32)
 
     @cached_property
     def face_normals(self) -> np.ndarray:
-        """Unit normals of all triangles, (n_triangles, 3)."""
+        """Unit normals of all triangles, (3, n_triangles)."""
         a, b, c = (self.vertices_m.take(self.triangles[:, k], axis=0).T for k in range(3))
         face = cross(b - a, c - a)
         face /= np.maximum(np.sqrt(dot(face, face)), np.float32(1e-20))
-        return np.ascontiguousarray(face.T)
+        return face
 
     @cached_property
     def owners(self) -> np.ndarray:
@@ -118,7 +120,9 @@ def _tensor(values: np.ndarray) -> o3d.core.Tensor:
     return o3d.core.Tensor.from_numpy(np.ascontiguousarray(values))  # no copy is made
 
 
-def trace_image(scene: RayScene, centre_m: np.ndarray, directions: np.ndarray, fine: np.ndarray) -> Trace:
+def trace_image(
+    scene: RayScene, centre_m: np.ndarray, directions: np.ndarray, fine: np.ndarray
+) -> tuple[Trace, Trace]:
     """Trace an image's rays, directions (3, height, width), skipping pixels inside a triangle.
 
     Every second row and column is traced. Between four of these that hit the same triangle, depth is
@@ -135,8 +139,10 @@ def trace_image(scene: RayScene, centre_m: np.ndarray, directions: np.ndarray, f
 
     Returns
     -------
-    Trace
+    image : Trace
         Its rows are the image's pixels; `barycentric` is left undefined between traced ones.
+    half : Trace
+        Of every second row and column.
     """
     height, width = directions.shape[1:]
     every_second = np.s_[::2, ::2]
@@ -149,21 +155,17 @@ def trace_image(scene: RayScene, centre_m: np.ndarray, directions: np.ndarray, f
     with np.errstate(divide="ignore"):  # infinite where nothing is
         np.reciprocal(depth_m, out=depth_m)
     depth_m[every_second] = coarse.depth_m.reshape(coarse_shape)
-    triangles = np.ascontiguousarray(doubled(triangle, (height, width)))
+    triangles = doubled(triangle, (height, width))
     barycentric = np.empty((height, width, 2), np.float32)
     barycentric[every_second] = coarse.barycentric.reshape(*coarse_shape, 2)
-    unknown = doubled(~plain, (height, width))
-    unknown[every_second] = False
+    unknown = doubled((~plain).view(np.uint8), (height, width))
+    unknown[every_second] = 0
     rest = np.flatnonzero(unknown)
     traced = scene.trace(join_rays(centre_m, pick(directions.reshape(3, -1), rest)))
     depth_m.ravel()[rest], triangles.ravel()[rest] = traced.depth_m, traced.triangle
     place(barycentric.reshape(-1, 2).T, rest, traced.barycentric.T)
-    return Trace(
-        depth_m.ravel(),
-        triangles.ravel(),
-        scene.surface_of_triangle.take(triangles.ravel(), mode="wrap"),
-        barycentric.reshape(-1, 2),
-    )
+    surface = scene.surface_of_triangle.take(triangles.ravel(), mode="wrap")
+    return Trace(depth_m.ravel(), triangles.ravel(), surface, barycentric.reshape(-1, 2)), coarse
 
 
 def _inside_one(triangle: np.ndarray, inner: np.ndarray) -> np.ndarray:
@@ -180,8 +182,10 @@ def _inside_one(triangle: np.ndarray, inner: np.ndarray) -> np.ndarray:
 
 
 def doubled(values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Each place (rows, columns) as two by two, cut to `shape`."""
-    return values.repeat(2, axis=0).repeat(2, axis=1)[: shape[0], : shape[1]]
+    """Each place (rows, columns, ...) as two by two, cut to `shape`."""
+    rows, columns = values.shape[:2]
+    full = cv2.resize(values, (2 * columns, 2 * rows), interpolation=cv2.INTER_NEAREST)
+    return np.ascontiguousarray(full[: shape[0], : shape[1]])
 
 
 def _between(values: np.ndarray, height: int, width: int) -> np.ndarray:
@@ -199,22 +203,21 @@ def interpolate(values: np.ndarray, corners: np.ndarray, weights: np.ndarray) ->
 
     Parameters
     ----------
-    values : array, shape (k, n_vertices)
-    corners : array of int, shape (3, n)
+    values : array, shape (n_vertices, k)
+    corners : array of int, shape (n, 3)
         Numbers of the triangles' vertices.
-    weights : array, shape (3, n)
+    weights : array, shape (n, 3), dtype float32
         Barycentric.
 
     Returns
     -------
     array, shape (k, n), dtype float32
     """
-    result = np.empty((len(values), corners.shape[1]), np.float32)
-    for found, component in zip(result, values, strict=True):
-        np.multiply(pick(component, corners[0]), weights[0], out=found)
-        for k in (1, 2):
-            found += pick(component, corners[k]) * weights[k]
-    return result
+    # A product with a sparse matrix reads each corner's values once, in one pass.
+    starts = np.arange(0, 3 * len(corners) + 1, 3, dtype=np.int32)
+    entries = weights.ravel(), corners.ravel().astype(np.int32, copy=False), starts
+    matrix = sparse.csr_array(entries, shape=(len(corners), len(values)))
+    return np.ascontiguousarray((matrix @ values.astype(np.float32, copy=False)).T)
 
 
 # Row by row and without checks, numpy copies selected elements several times faster than by indexing.

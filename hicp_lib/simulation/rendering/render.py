@@ -9,10 +9,10 @@ import numpy as np
 from hicp_lib.simulation.rendering.antialias import edge_pixels, smooth_edges
 from hicp_lib.simulation.rendering.camera import PlacedCamera, image_directions
 from hicp_lib.simulation.rendering.filters import tilt_by_height
-from hicp_lib.simulation.rendering.gbuffer import GBuffer, Shading, evaluate_materials
+from hicp_lib.simulation.rendering.gbuffer import GBuffer, Shading, View, evaluate_materials
 from hicp_lib.simulation.rendering.lights import Ambient, Light, ambient_light, diffuse_and_highlight
-from hicp_lib.simulation.rendering.raycast import RayScene, dot, doubled, place, trace_image
-from hicp_lib.simulation.rendering.shadows import visibility
+from hicp_lib.simulation.rendering.raycast import RayScene, dot, doubled, pick, place, trace_image
+from hicp_lib.simulation.rendering.shadows import from_half, visibility
 from hicp_lib.simulation.rendering.surfaces import Surface, column
 
 _BLOCK = 16_384  # pixels shaded at a time, to fit the processor's cache
@@ -93,36 +93,35 @@ def render(world: World, camera: PlacedCamera, rng: np.random.Generator) -> Fram
     >>> frame.radiance.shape, float(frame.depth_m[24, 32].round(3))
     ((48, 64, 3), 3.0)
     """
-    scene, centre_m, directions = world.rays, camera.centre_m, image_directions(camera)
+    scene, directions = world.rays, image_directions(camera)
+    centre_m = camera.centre_m.astype(np.float32)
     shape = (camera.height_px, camera.width_px)
-    trace = trace_image(scene, centre_m, directions, scene.owners[:-1] >= 0)
+    trace, half_trace = trace_image(scene, centre_m, directions, scene.owners[:-1] >= 0)
     person = scene.owners.take(trace.surface, mode="wrap").reshape(shape)
     is_person = person >= 0
-    around = GBuffer.of(trace, centre_m, directions, np.s_[::2, ::2], ~is_person)
-    painted = _paint(world, around, camera, False, rng)
+    half = View(half_trace, centre_m, np.ascontiguousarray(directions[:, ::2, ::2]))
+    coarse = [GBuffer.of(half, wanted[::2, ::2]) for wanted in (~is_person, is_person)]
+    normals = [part.normals(scene) for part in coarse]
+    seen = visibility(world.lights, scene, coarse, normals, rng)
+    around, _ = coarse
+    painted = _paint(world, around, normals[0], camera, pick(seen, around.pixels))
     image = _enlarge(painted, around, trace.surface.reshape(shape), ~is_person)
     pixels = image.reshape(-1, 3).T
     place(pixels, np.flatnonzero(trace.surface < 0), column(world.backdrop))
-    rows, columns = (np.flatnonzero(is_person.any(axis=axis)) for axis in (1, 0))
-    if len(rows):
-        crop = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        people = GBuffer.of(trace, centre_m, directions, crop, is_person)
-        place(pixels, np.flatnonzero(is_person), _paint(world, people, camera, True, rng))
+    if is_person.any():
+        people = GBuffer.of(View(trace, centre_m, directions), is_person)
+        lit = from_half(seen, half, people)
+        place(pixels, people.pixels, _paint(world, people, people.normals(scene), camera, lit))
         image = smooth_edges(image, edge_pixels(trace, is_person), trace, scene, camera)
     return Frame(image, trace.depth_m.reshape(shape), person, scene)
 
 
-def _paint(
-    world: World, gbuffer: GBuffer, camera: PlacedCamera, sharp: bool, rng: np.random.Generator
-) -> np.ndarray:
-    """Linear RGB of a G-buffer's pixels, (3, n)."""
-    shading = evaluate_materials(world.rays, gbuffer, 1 / camera.fx_px)
-    normals = gbuffer.on_grid(shading.normals)
+def _paint(world: World, gbuffer: GBuffer, normals, camera: PlacedCamera, seen: np.ndarray) -> np.ndarray:
+    """Linear RGB of a G-buffer's pixels, (3, n), where `seen` (n_lights + 1, n) is visible of each light."""
+    shading = evaluate_materials(world.rays, gbuffer, normals, 1 / camera.fx_px)
     if shading.height_m.any():
-        tilt_by_height(normals, gbuffer.on_grid(shading.height_m[None])[0], gbuffer)
-        shading.normals = gbuffer.from_grid(normals)
-    seen = visibility(world.lights, world.rays, gbuffer, normals, sharp, rng)
-    positions_m, painted = gbuffer.from_grid(gbuffer.positions_m), np.empty_like(shading.normals)
+        shading.normals = tilt_by_height(shading.normals, shading.height_m, gbuffer)
+    positions_m, painted = gbuffer.positions_m, np.empty_like(shading.normals)
     for start in range(0, len(gbuffer.pixels), _BLOCK):
         block = slice(start, start + _BLOCK)
         geometry = (values[:, block] for values in (positions_m, gbuffer.directions, seen))
@@ -151,25 +150,24 @@ def _shade_block(world: World, shading: Shading, positions_m, direction, seen: n
     return diffuse
 
 
-def _enlarge(painted: np.ndarray, view: GBuffer, surface: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def _enlarge(painted: np.ndarray, around: GBuffer, surface: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """From every second pixel to all, (height, width, 3), out of focus; colours run on under people.
 
     Each `wanted` pixel takes the colour (3, n) of the nearest painted one that shows the same
     surface, so that outlines stay where they are.
     """
-    shape = view.surface.shape
-    coarse = np.zeros((*shape, 4), np.float32)
-    channels = coarse.reshape(-1, 4).T
-    place(channels, view.pixels, [*painted, np.float32(1)])
-    coarse += 1e-4 * cv2.blur(coarse, (9, 9)) + np.float32(1e-9)
-    # As `doubled`; OpenCV is faster with several channels.
-    full = cv2.resize(coarse, (2 * shape[1], 2 * shape[0]), interpolation=cv2.INTER_NEAREST)
-    full = np.ascontiguousarray(full[: surface.shape[0], : surface.shape[1]])
-    wrong, best = _nearest_alike(view.surface, surface, wanted)
-    place(full.reshape(-1, 4).T, wrong, channels.take(best, axis=1))
-    full = cv2.GaussianBlur(full, (7, 7), 1.1)
-    *colours, weight = cv2.split(full)
-    return cv2.merge([cv2.divide(colour, weight) for colour in colours])
+    shape = around.view.shape
+    coarse, shown = np.zeros((*shape, 4), np.float32), np.full(shape, -1, np.int16)
+    place(coarse.reshape(-1, 4).T, around.pixels, [*painted, np.float32(1)])
+    shown.ravel()[around.pixels] = around.view.trace.surface.take(around.pixels)
+    empty = np.flatnonzero(shown < 0)
+    *near, weight = cv2.blur(coarse, (9, 9)).reshape(-1, 4).take(empty, axis=0).T
+    colours = np.ascontiguousarray(coarse[..., :3])
+    place(colours.reshape(-1, 3).T, empty, near / np.maximum(weight, np.float32(1e-9)))
+    full = doubled(colours, surface.shape)
+    wrong, best = _nearest_alike(shown, surface, wanted)
+    full.reshape(-1, 3)[wrong] = colours.reshape(-1, 3).take(best, axis=0)
+    return cv2.GaussianBlur(full, (7, 7), 1.1)
 
 
 def _nearest_alike(coarse: np.ndarray, surface: np.ndarray, wanted: np.ndarray):

@@ -1,24 +1,24 @@
-"""Visible fraction of each light at every pixel: one ray towards a point of each light, then a filter."""
+"""Visible fraction of each light: rays towards points of each light, then a filter."""
 
 import numpy as np
 
 from hicp_lib.simulation.rendering import lights
 from hicp_lib.simulation.rendering.camera import join_rays
 from hicp_lib.simulation.rendering.filters import sum_within
-from hicp_lib.simulation.rendering.gbuffer import GBuffer
-from hicp_lib.simulation.rendering.raycast import RayScene, dot, pick
+from hicp_lib.simulation.rendering.gbuffer import GBuffer, View
+from hicp_lib.simulation.rendering.raycast import RayScene, dot, pick, place
 from hicp_lib.simulation.rendering.surfaces import column
 
 AMBIENT_REACH_M = 0.7
 _OFF_SURFACE_M = 0.003  # start of rays
+_ROUNDS = 2  # of the filter
 
 
 def visibility(
     sources: list[lights.Light],
     scene: RayScene,
-    gbuffer: GBuffer,
-    normals: np.ndarray,
-    sharp: bool,
+    gbuffers: list[GBuffer],
+    normals: list[np.ndarray],
     rng: np.random.Generator,
 ) -> np.ndarray:
     """Visible share of each light and of the surroundings.
@@ -29,34 +29,67 @@ def visibility(
     ----------
     sources : list of lights.Light
     scene : RayScene
-    gbuffer : GBuffer
-    normals : array, shape (3, rows, columns)
-        Of all pixels of the G-buffer's grid.
-    sharp : bool
-        Whether to use a smaller filter.
+    gbuffers : list of GBuffer
+        Parts of one view.
+    normals : list of array, shape (3, n)
+        Of each.
     rng : numpy.random.Generator
 
     Returns
     -------
-    array, shape (n_lights + 1, n), dtype float32
-        In [0, 1], the surroundings last.
+    array, shape (n_lights + 1, n_pixels), dtype float32
+        At all pixels of the view; in [0, 1], the surroundings last.
     """
-    row, column = np.arange(gbuffer.surface.shape[0])[:, None], np.arange(gbuffer.surface.shape[1])
-    turn = (row + column) % 2 == 0
-    asked = np.flatnonzero(turn.ravel().take(gbuffer.pixels))
-    pixels = gbuffer.pixels.take(asked)
+    view = gbuffers[0].view
+    surface = view.trace.surface
+    grid = np.zeros((6, surface.size), np.float32)  # positions and normals
+    for part, facing in zip(gbuffers, normals, strict=True):
+        place(grid, part.pixels, [*part.positions_m, *facing])
+    positions_m, facing_out = grid[:3], grid[3:]
+    row, column = np.arange(view.shape[0])[:, None], np.arange(view.shape[1])
+    pixels = np.flatnonzero(((row + column) % 2 == 0).ravel() & (surface >= 0))
     cell = (row % 4 * 4 + column % 4).ravel().take(pixels)
-    facing_out = pick(normals.reshape(3, -1), pixels)
-    origins = pick(gbuffer.positions_m.reshape(3, -1), pixels) + np.float32(_OFF_SURFACE_M) * facing_out
-    counts = np.zeros((len(sources) + 2, gbuffer.surface.size), np.int16)
+    outwards = pick(facing_out, pixels)
+    origins_m = pick(positions_m, pixels) + np.float32(_OFF_SURFACE_M) * outwards
+    counts = np.zeros((len(sources) + 2, surface.size), np.int16)
     for kind, source in enumerate([*sources, None]):
         offsets = lights.sample_offsets(cell, kind, rng)
-        counts[kind][pixels] = _sees(scene, source, origins, facing_out, offsets)
-    counts[-1] = turn.ravel()
-    counts = counts.reshape(-1, *gbuffer.surface.shape)
-    sums = sum_within(counts, gbuffer.surface, gbuffer.positions_m, normals, 2 if sharp else 3)
-    *seen, weight = gbuffer.from_grid(sums).astype(np.float32)
+        counts[kind][pixels] = _sees(scene, source, origins_m, outwards, offsets)
+    counts[-1][pixels] = 1
+    around = (values.reshape(-1, *view.shape) for values in (positions_m, facing_out))
+    counts = counts.reshape(-1, *view.shape)
+    sums = sum_within(counts, surface.reshape(view.shape), *around, _ROUNDS)
+    *seen, weight = sums.reshape(len(sums), -1).astype(np.float32)
     return np.where(weight > 0, np.stack(seen) / np.maximum(weight, 1), np.float32(1))
+
+
+def from_half(values: np.ndarray, half: View, gbuffer: GBuffer) -> np.ndarray:
+    """Values at every second row and column, interpolated to pixels within the surfaces they show.
+
+    Parameters
+    ----------
+    values : array, shape (k, n_half), dtype float32
+    half : View
+        Every second row and column of the G-buffer's.
+    gbuffer : GBuffer
+
+    Returns
+    -------
+    array, shape (k, n), dtype float32
+        Where no neighbour shows a pixel's surface, that of the nearest.
+    """
+    row, column = np.divmod(gbuffer.pixels, gbuffer.view.shape[1])
+    surface = gbuffer.view.trace.surface.take(gbuffer.pixels)
+    total = np.float32(1e-3) * pick(values, row // 2 * half.shape[1] + column // 2)
+    weight = np.full(len(row), 1e-3, np.float32)
+    for below in (0, 1):
+        start = np.minimum((row + below) // 2, half.shape[0] - 1) * half.shape[1]
+        for right in (0, 1):
+            near = start + np.minimum((column + right) // 2, half.shape[1] - 1)
+            alike = half.trace.surface.take(near) == surface
+            total += alike * pick(values, near)
+            weight += alike
+    return total / weight
 
 
 def _sees(scene: RayScene, source: lights.Light | None, origins_m, normals, offsets) -> np.ndarray:
@@ -70,5 +103,6 @@ def _sees(scene: RayScene, source: lights.Light | None, origins_m, normals, offs
     towards = column(source.centre_m) + s * column(source.half_u_m) + t * column(source.half_v_m) - origins_m
     facing = np.flatnonzero(dot(towards, normals) > 0)  # pixels facing away are dark without a ray
     seen = np.ones(len(origins_m.T), bool)
-    seen[facing] = ~scene.occluded(join_rays(origins_m, towards).take(facing, axis=0), 0.98)
+    rays = join_rays(pick(origins_m, facing), pick(towards, facing))
+    seen[facing] = ~scene.occluded(rays, 0.98)
     return seen
