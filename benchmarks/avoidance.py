@@ -64,7 +64,7 @@ def make_frames(n: int) -> list[tuple[np.ndarray, np.ndarray, Camera, Detections
     for index in range(n):
         rng = np.random.default_rng(np.random.SeedSequence([SEED, index]))
         stage = random_stage(rng)
-        camera, frame = stage.camera, render(stage.world, stage.camera, rng)
+        camera, frame = stage.camera, render(stage.world, stage.camera)
         image = expose(frame.radiance, stage.sensor, rng, frame.person >= 0)
         depth = simulate_depth(frame.rays, camera, D435, rng)
         pixels = np.stack([project_world(camera, person.keypoints_m)[0] for person in stage.people])

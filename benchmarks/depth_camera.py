@@ -35,7 +35,7 @@ def frame_cost(index: int, turns: int) -> list[float]:
     rng = np.random.default_rng(np.random.SeedSequence([SEED, index]))
     stage = random_stage(rng)
     start = time.process_time()
-    frame = render(stage.world, stage.camera, rng)
+    frame = render(stage.world, stage.camera)
     rendered_s = time.process_time() - start
     scene, camera = frame.rays, stage.camera
     rays = pixel_rays(depth_imager(camera, D435))

@@ -64,7 +64,7 @@ def _draw(plan: Scenario, k: int) -> float:
     world, _ = plan.stage(Subject(), float(plan.times_s(k + 1)[k]))
     camera = camera_at(plan, k)
     start_s = time.process_time()
-    render(world, camera, np.random.default_rng(k))
+    render(world, camera)
     return time.process_time() - start_s
 
 

@@ -36,7 +36,7 @@ def frame_steps(index: int) -> dict[str, float]:
     clock = [time.process_time()]
     stage = random_stage(rng)
     clock.append(time.process_time())
-    frame = render(stage.world, stage.camera, rng)
+    frame = render(stage.world, stage.camera)
     clock.append(time.process_time())
     annotate(stage, frame)
     expose(frame.radiance, stage.sensor, rng, frame.person >= 0)

@@ -127,7 +127,7 @@ def _photograph(
     person: PosedBody, world: World, distance_m: float, subject: Subject
 ) -> tuple[Frame, Picture]:
     camera = _camera(distance_m)
-    frame = render(world, camera, subject.stream())
+    frame = render(world, camera)
     pixels, seen = keypoint_visibility(frame.rays, camera, person.keypoints_m, 0)
     mask = frame.person == 0
     return frame, Picture(_developed(frame, PHOTOGRAPHIC, subject), mask, pixels, seen, float(mask.sum()))

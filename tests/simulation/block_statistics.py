@@ -367,7 +367,7 @@ def rendered() -> list[np.ndarray]:
     wall = Surface(quad([-1, -3, 0], [0, 6, 0], [0, 0, 3]), materials.paint(np.full(3, 0.6), 0.1))
     world = World([wall, *people.dress(appearance, posed, 0)], [lamp], ambient, np.zeros(3))
     camera = PlacedCamera(64, 48, 50.0, 50.0, 31.5, 23.5, look_at([2.2, 0.4, 1.3], [0, 0, 1.0]))
-    frame = render(world, camera, np.random.default_rng(0))
+    frame = render(world, camera)
     sensor = Sensor(np.array([1.05, 1.0, 0.95]), saturation=0.9)
     image = expose(frame.radiance, sensor, np.random.default_rng(1), frame.person >= 0)
     return [frame.radiance.reshape(-1, 3), image.reshape(-1, 3), (frame.person >= 0).reshape(-1, 1)]

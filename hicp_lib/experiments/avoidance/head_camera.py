@@ -136,7 +136,7 @@ def photograph(moment: Moment, posture: Posture) -> RgbdImage:
     icub, rng = load_icub(), moment.subject.stream(moment.script, round(1000 * moment.time_s))
     camera = robot_camera(icub.T_root_camera(posture.angles("head"), MOUNT))
     world = moment.world(robot_surfaces(icub, posture))
-    return colour_and_depth(render(world, camera, rng), camera, rng)
+    return colour_and_depth(render(world, camera), camera, rng)
 
 
 def lifted(
@@ -224,5 +224,5 @@ def onlooker_view(world: World, robot: list[Surface]) -> np.ndarray:
     near = [s for s in others if (s.mesh.vertices_m > low).all() and (s.mesh.vertices_m < high).all()]
     sharp = [replace(surface, person=_SHARP) for surface in [*robot, *near]]
     rng = np.random.default_rng(0)
-    frame = render(replace(world, surfaces=[_FLOOR, *people, *sharp], backdrop=_BACKDROP), CAMERA, rng)
+    frame = render(replace(world, surfaces=[_FLOOR, *people, *sharp], backdrop=_BACKDROP), CAMERA)
     return expose(frame.radiance, _SENSOR, rng, frame.person >= 0)

@@ -42,7 +42,7 @@ def record_frame(name: str, subject: Subject, k: int) -> tuple[np.ndarray, np.nd
     plan, rng = scenario(name, subject.number), subject.stream(name.partition("@")[0], k)
     world, person = plan.stage(subject, float(plan.times_s(k + 1)[k]))
     camera = camera_at(plan, k)
-    frame = render(world, camera, rng)
+    frame = render(world, camera)
     rgb, depth_m = colour_and_depth(frame, camera, rng, plan.depth_camera)
     _, visible = keypoint_visibility(frame.rays, camera, person.keypoints_m, 0)
     truth = {"keypoints_m": in_root(person.keypoints_m).round(6).tolist(), "visible": visible.tolist()}

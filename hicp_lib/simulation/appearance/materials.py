@@ -44,6 +44,11 @@ def any_colour(rng: Rng) -> np.ndarray:
     return hsv(rng.random(), rng.beta(2, 2.2), rng.uniform(0.2, 0.9))
 
 
+def muted(rng: Rng) -> np.ndarray:
+    """A typical colour of furniture and curtains: greys and dull colours, linear RGB."""
+    return hsv(rng.random(), rng.beta(1.4, 6), rng.uniform(0.2, 0.85))
+
+
 def off_white(rng: Rng) -> np.ndarray:
     """White as paint is white, linear RGB."""
     return hsv(rng.uniform(0.06, 0.16), rng.uniform(0, 0.06), rng.uniform(0.84, 0.95))
@@ -71,6 +76,16 @@ def plain(colour: np.ndarray, roughness: float = 0.5, gloss: float = 0.04, glow:
     Look
     """
     return Look(column(colour), gloss=gloss, roughness=roughness, glow=glow and column(glow * colour))
+
+
+def one_of(colours: list[np.ndarray], roughness: float) -> Material:
+    """Plain colours, (3,) each; the mesh's only coordinate says which."""
+    palette = np.array(colours, np.float32).T
+
+    def look(coords: np.ndarray, footprint_m: np.ndarray) -> Look:
+        return Look(palette.take(np.rint(coords[0]).astype(int), axis=1), roughness=roughness)
+
+    return look
 
 
 def mixed(
@@ -115,7 +130,7 @@ def wooden(rng: Rng) -> Material:
 
 def upholstery(rng: Rng) -> Material:
     """Cloth on furniture."""
-    return mixed(textures.carpet, np.outer([0.7, 1.3], any_colour(rng)), 0.9, gloss=0.02)
+    return mixed(textures.carpet, np.outer([0.85, 1.15], muted(rng)), 0.9, gloss=0.02)
 
 
 def random_floor(rng: Rng) -> Material:
@@ -128,19 +143,19 @@ def random_floor(rng: Rng) -> Material:
         colour = hsv(rng.random(), rng.uniform(0, 0.2), rng.uniform(0.35, 0.9))
         grout = linear(np.full(3, rng.uniform(0.3, 0.7)))
         return mixed(textures.tiles, np.array([colour * 0.85, colour * 1.15, grout]), rng.uniform(0.15, 0.4))
-    colour = hsv(rng.random(), rng.uniform(0, 0.35), rng.uniform(0.25, 0.75))
+    colour = hsv(rng.random(), rng.uniform(0, 0.22), rng.uniform(0.25, 0.75))
     if kind == 2:
-        return mixed(textures.carpet, np.outer([0.6, 1.4], colour), 0.95, gloss=0.01)
-    return mixed(textures.plaster, np.outer([0.8, 1.2], colour), 0.5)
+        return mixed(textures.carpet, np.outer([0.8, 1.2], colour), 0.95, gloss=0.01)
+    return mixed(textures.plaster, np.outer([0.9, 1.1], colour), 0.5)
 
 
 def random_wall(rng: Rng) -> Material:
-    """Paint, mostly light; sometimes strong colours, bricks or wooden boards."""
+    """Paint, mostly light; sometimes darker, bricks or wooden boards."""
     kind = rng.choice(4, p=[0.6, 0.22, 0.1, 0.08])
     if kind == 0:
-        return paint(hsv(rng.random(), rng.beta(1.2, 8), rng.uniform(0.7, 0.95)), 0.05)
+        return paint(hsv(rng.random(), rng.beta(1.2, 12), rng.uniform(0.7, 0.95)), 0.025)
     if kind == 1:
-        return paint(hsv(rng.random(), rng.uniform(0.15, 0.55), rng.uniform(0.35, 0.8)), 0.06)
+        return paint(hsv(rng.random(), rng.uniform(0.08, 0.3), rng.uniform(0.4, 0.8)), 0.03)
     if kind == 2:
         colour = hsv(rng.uniform(0.02, 0.07), rng.uniform(0.2, 0.6), rng.uniform(0.4, 0.8))
         mortar = linear(np.full(3, rng.uniform(0.5, 0.75)))

@@ -25,7 +25,7 @@ from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.core.memo import memoised
-from hicp_lib.core.rotations import rotations_from_vectors
+from hicp_lib.core.rotations import rotation
 from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.rendering.mesh import vertex_normals
 
@@ -277,8 +277,7 @@ def rotation_matrices(body: Body, pose: Pose) -> np.ndarray:
     number = body.bone_numbers
     result = np.tile(np.eye(3), (len(number), 1, 1))
     for name, turn in pose.items():
-        is_matrix = np.ndim(turn) == 2
-        result[number[name]] = turn if is_matrix else rotations_from_vectors(np.array([turn], float))[0]
+        result[number[name]] = turn if np.ndim(turn) == 2 else rotation(turn)
     return result
 
 

@@ -85,7 +85,7 @@ def expose(
     light = cv2.multiply(light, cv2.merge([lens * np.float32(gain) for gain in gains]))
     variance = light * np.float32(sensor.shot_noise**2)
     variance += np.float32(sensor.read_noise**2)
-    light += cv2.multiply(cv2.sqrt(variance), _noise(height, width, rng))
+    light = cv2.add(light, cv2.multiply(cv2.sqrt(variance), _noise(height, width, rng)))
     saturate = sensor.saturation * np.eye(3) + (1 - sensor.saturation) * _LUMINANCE
     return _tone(cv2.transform(light, saturate.astype(np.float32)), sensor.contrast)
 
@@ -122,5 +122,6 @@ def _tone(light: np.ndarray, contrast: float) -> np.ndarray:
     srgb = np.where(shoulder <= 0.0031308, 12.92 * shoulder, 1.055 * shoulder ** (1 / 2.4) - 0.055)
     curved = 0.5 + 0.5 * np.tanh(contrast * 2 * (srgb - 0.46)) / np.tanh(contrast)
     table = np.clip(255 * (0.35 * curved + 0.65 * srgb) + 0.5, 0, 255).astype(np.uint8)
-    levels = cv2.multiply(light, np.ones(1), scale=(_N_TONES - 1) / 4, dtype=cv2.CV_16U)  # from 0
-    return table.take(levels, mode="clip")
+    flat = light.reshape(len(light), -1)
+    levels = cv2.addWeighted(flat, (_N_TONES - 1) / 4, flat, 0, 0, dtype=cv2.CV_16U)  # negative ones are 0
+    return table.take(levels, mode="clip").reshape(light.shape)

@@ -45,24 +45,25 @@ class GBuffer:
     view : View
     pixels : array of int, shape (n,)
         Their numbers in the view, row by row.
-    parts : dict of slice
-        Of the n pixels, those that show a surface, by its number.
+    parts : list of tuple
+        Numbers of the surfaces that are seen, and which of the n pixels show each.
     """
 
     view: View
     pixels: np.ndarray
-    parts: dict[int, slice]
+    parts: list[tuple[int, slice]]
 
     @classmethod
     def of(cls, view: View, wanted: np.ndarray) -> "GBuffer":
         """Of the pixels that are `wanted`, (rows, columns), and show something."""
         pixels = np.flatnonzero(wanted.ravel() & (view.trace.surface >= 0))
         surface = view.trace.surface.take(pixels)
-        order = np.argsort(surface, kind="stable")
-        numbers, starts = np.unique(surface.take(order), return_index=True)
-        ends = [*starts[1:].tolist(), len(pixels)]
-        parts = {int(k): slice(int(a), b) for k, a, b in zip(numbers, starts, ends, strict=True)}
-        return cls(view, pixels.take(order), parts)
+        parts, start = [], 0
+        for number, n in enumerate(np.bincount(surface).tolist()):
+            if n:
+                parts.append((number, slice(start, start + n)))
+            start += n
+        return cls(view, pixels.take(np.argsort(surface, kind="stable")), parts)
 
     @cached_property
     def directions(self) -> np.ndarray:
@@ -135,13 +136,17 @@ def evaluate_materials(scene: RayScene, gbuffer: GBuffer, normals: np.ndarray, p
         Of the G-buffer's n pixels.
     """
     n = len(gbuffer.pixels)
-    empty = {f.name: np.zeros((3, n) if f.name in ("albedo", "glow") else n, np.float32) for f in fields(Look)}
+    empty = {
+        f.name: np.zeros((3, n) if f.name in ("albedo", "glow") else n, np.float32) for f in fields(Look)
+    }
     shading = Shading(normals=normals, **empty)
-    for number, part in gbuffer.parts.items():
+    for number, part in gbuffer.parts:
         surface = scene.surfaces[number]
         look = surface.material
         if not isinstance(look, Look):
-            corners = surface.mesh.triangles.take(gbuffer.triangle[part] - scene.first_triangle[number], axis=0)
+            corners = surface.mesh.triangles.take(
+                gbuffer.triangle[part] - scene.first_triangle[number], axis=0
+            )
             coords = interpolate(surface.mesh.coords, corners, gbuffer.weights[part])
             look = look(coords, gbuffer.depth_m[part] * np.float32(pixel_rad))
         for name, value in vars(look).items():

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.rendering.gbuffer import Shading
 from hicp_lib.simulation.rendering.raycast import dot
 from hicp_lib.simulation.rendering.surfaces import column
@@ -61,28 +62,32 @@ _STRATA = np.array([0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5])
 _PLACES = np.stack([_STRATA % 8 * 2 + _STRATA // 8, 5 * _STRATA % 16]).astype(np.float32)
 
 
-def sample_offsets(cell: np.ndarray, kind: int, rng: np.random.Generator) -> np.ndarray:
-    """Points of the unit square: 16 points of a lattice that repeat every 4 x 4 pixels, jittered.
+# Shifts from one 4 x 4 pattern to the next, to the right and down. Multiples of irrational numbers cover the
+# unit square evenly (Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018).
+_STEPS = np.array([[0.7548777, 0.5698403], [0.8191725, 0.6710436]])
+
+
+@memoised(16)
+def sample_offsets(rows: int, columns: int, kind: int) -> np.ndarray:
+    """Points of the unit square: 16 points of a lattice that repeat every 4 x 4 pixels, each time shifted.
 
     The pixels of either colour of a chessboard cover the square as well.
 
     Parameters
     ----------
-    cell : array of int, shape (n,)
-        Each pixel's number in the 4 x 4 pattern, row by row.
+    rows, columns : int
+        Of the image.
     kind : int
         Number of the light; each has the pattern moved.
-    rng : numpy.random.Generator
 
     Returns
     -------
-    array, shape (2, n), dtype float32
+    array, shape (2, rows * columns), dtype float32
     """
+    row, column = np.mgrid[:rows, :columns].reshape(2, -1)
     moved = np.roll(_PLACES.reshape(2, 4, 4), (-kind, -3 * kind), axis=(1, 2)).reshape(2, 16)
-    offsets = rng.random((2, len(cell)), np.float32)
-    offsets += moved.take(cell, axis=1)
-    offsets *= np.float32(1 / 16)
-    return offsets
+    shift = _STEPS @ np.stack([column // 4, row // 4]) % 1
+    return ((moved.take(row % 4 * 4 + column % 4, axis=1) + shift) / 16).astype(np.float32)
 
 
 def diffuse_and_highlight(

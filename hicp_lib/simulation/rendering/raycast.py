@@ -84,7 +84,8 @@ class RayScene:
     @cached_property
     def face_normals(self) -> np.ndarray:
         """Unit normals of all triangles, (3, n_triangles)."""
-        a, b, c = (self.vertices_m.take(self.triangles[:, k], axis=0).T for k in range(3))
+        vertices_m = np.ascontiguousarray(self.vertices_m.T)
+        a, b, c = (pick(vertices_m, corners) for corners in self.triangles.T.astype(np.intp))
         face = cross(b - a, c - a)
         face /= np.maximum(np.sqrt(dot(face, face)), np.float32(1e-20))
         return face

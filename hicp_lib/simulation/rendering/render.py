@@ -64,7 +64,7 @@ class Frame:
     rays: RayScene
 
 
-def render(world: World, camera: PlacedCamera, rng: np.random.Generator) -> Frame:
+def render(world: World, camera: PlacedCamera) -> Frame:
     """Render one frame.
 
     Depth and people are exact at every pixel, but only people are shaded at full resolution, in focus.
@@ -74,8 +74,6 @@ def render(world: World, camera: PlacedCamera, rng: np.random.Generator) -> Fram
     ----------
     world : World
     camera : PlacedCamera
-    rng : numpy.random.Generator
-        Scatters the shadow rays.
 
     Returns
     -------
@@ -89,7 +87,7 @@ def render(world: World, camera: PlacedCamera, rng: np.random.Generator) -> Fram
     >>> wall = Surface(quad([-5, 2, -5], [10, 0, 0], [0, 0, 10]), plain(np.full(3, 0.5)))
     >>> dim = Ambient(np.full(3, 0.4), np.full(3, 0.2), np.zeros(3), np.array([1.0, 0, 0]))
     >>> camera = PlacedCamera(64, 48, 60.0, 60.0, 31.5, 23.5, look_at([0, -1, 0], [0, 0, 0]))
-    >>> frame = render(World([wall], [], dim, np.zeros(3)), camera, np.random.default_rng(0))
+    >>> frame = render(World([wall], [], dim, np.zeros(3)), camera)
     >>> frame.radiance.shape, float(frame.depth_m[24, 32].round(3))
     ((48, 64, 3), 3.0)
     """
@@ -102,7 +100,7 @@ def render(world: World, camera: PlacedCamera, rng: np.random.Generator) -> Fram
     half = View(half_trace, centre_m, np.ascontiguousarray(directions[:, ::2, ::2]))
     coarse = [GBuffer.of(half, wanted[::2, ::2]) for wanted in (~is_person, is_person)]
     normals = [part.normals(scene) for part in coarse]
-    seen = visibility(world.lights, scene, coarse, normals, rng)
+    seen = visibility(world.lights, scene, coarse, normals)
     around, _ = coarse
     painted = _paint(world, around, normals[0], camera, pick(seen, around.pixels))
     image = _enlarge(painted, around, trace.surface.reshape(shape), ~is_person)
@@ -136,7 +134,7 @@ def _shade_block(world: World, shading: Shading, positions_m, direction, seen: n
     facing *= facing
     fresnel = shading.gloss * (1 + 4 * facing * facing) * (1 - np.float32(0.7) * shading.roughness)
     # Part of the blocked light arrives by indirect reflection: crevices are not black.
-    diffuse *= seen[-1] * np.float32(0.85) + np.float32(0.15)
+    diffuse *= seen[-1] * np.float32(0.95) + np.float32(0.05)
     highlight = fresnel * diffuse
     for source, visible in zip(world.lights, seen[:-1], strict=True):
         more, shine = diffuse_and_highlight(source, positions_m, view, shading)

@@ -9,17 +9,13 @@ from hicp_lib.simulation.rendering.gbuffer import GBuffer, View
 from hicp_lib.simulation.rendering.raycast import RayScene, dot, pick, place
 from hicp_lib.simulation.rendering.surfaces import column
 
-AMBIENT_REACH_M = 0.7
+AMBIENT_REACH_M = 0.4
 _OFF_SURFACE_M = 0.003  # start of rays
-_ROUNDS = 2  # of the filter
+_ROUNDS = 3  # of the filter
 
 
 def visibility(
-    sources: list[lights.Light],
-    scene: RayScene,
-    gbuffers: list[GBuffer],
-    normals: list[np.ndarray],
-    rng: np.random.Generator,
+    sources: list[lights.Light], scene: RayScene, gbuffers: list[GBuffer], normals: list[np.ndarray]
 ) -> np.ndarray:
     """Visible share of each light and of the surroundings.
 
@@ -33,7 +29,6 @@ def visibility(
         Parts of one view.
     normals : list of array, shape (3, n)
         Of each.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -46,19 +41,18 @@ def visibility(
     for part, facing in zip(gbuffers, normals, strict=True):
         place(grid, part.pixels, [*part.positions_m, *facing])
     positions_m, facing_out = grid[:3], grid[3:]
-    row, column = np.arange(view.shape[0])[:, None], np.arange(view.shape[1])
-    pixels = np.flatnonzero(((row + column) % 2 == 0).ravel() & (surface >= 0))
-    cell = (row % 4 * 4 + column % 4).ravel().take(pixels)
+    turn = (np.arange(view.shape[0])[:, None] + np.arange(view.shape[1])) % 2 == 0
+    pixels = np.flatnonzero(turn.ravel() & (surface >= 0))
     outwards = pick(facing_out, pixels)
     origins_m = pick(positions_m, pixels) + np.float32(_OFF_SURFACE_M) * outwards
     counts = np.zeros((len(sources) + 2, surface.size), np.int16)
     for kind, source in enumerate([*sources, None]):
-        offsets = lights.sample_offsets(cell, kind, rng)
+        offsets = pick(lights.sample_offsets(*view.shape, kind), pixels)
         counts[kind][pixels] = _sees(scene, source, origins_m, outwards, offsets)
     counts[-1][pixels] = 1
-    around = (values.reshape(-1, *view.shape) for values in (positions_m, facing_out))
-    counts = counts.reshape(-1, *view.shape)
-    sums = sum_within(counts, surface.reshape(view.shape), *around, _ROUNDS)
+    shape = (-1, *view.shape)
+    around = surface.reshape(view.shape), positions_m.reshape(shape), facing_out.reshape(shape)
+    sums = sum_within(counts.reshape(shape), *around, _ROUNDS)
     *seen, weight = sums.reshape(len(sums), -1).astype(np.float32)
     return np.where(weight > 0, np.stack(seen) / np.maximum(weight, 1), np.float32(1))
 

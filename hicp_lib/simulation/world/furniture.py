@@ -95,7 +95,7 @@ def _chair(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
     frame = legs((-r, r), (-r, r), 0.02, 0, h) + legs((-r, r), (r,), 0.02, h, 0.95)
     cushions = [((-r - 0.02, -r - 0.02, h), (r + 0.02, r + 0.02, h + 0.05))]
     cushions.append(((-r, r - 0.025, 0.62), (r, r + 0.025, 0.95)))
-    seat = m.upholstery(rng) if rng.random() < 0.5 else m.plain(m.any_colour(rng), 0.4)
+    seat = m.upholstery(rng) if rng.random() < 0.5 else m.plain(m.muted(rng), 0.4)
     stand = m.wooden(rng) if rng.random() < 0.5 else m.plain(np.full(3, 0.08), 0.3)
     return [Surface(_boxes_at(place, yaw, frame), stand), Surface(_boxes_at(place, yaw, cushions), seat)]
 
@@ -137,7 +137,7 @@ def _boxes(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
     for _ in range(rng.integers(1, 4)):
         a, b, h = rng.uniform([0.15, 0.12, 0.12], [0.3, 0.25, 0.4])
         mesh = g.box(place + [-a, -b, z], place + [a, b, z + h], yaw + rng.normal(0, 0.15))
-        colour = np.array([0.42, 0.28, 0.15]) if rng.random() < 0.6 else m.any_colour(rng)
+        colour = np.array([0.42, 0.28, 0.15]) if rng.random() < 0.6 else m.muted(rng)
         surfaces.append(Surface(mesh, m.paint(colour, 0.1)))
         z += h
     return surfaces
@@ -185,4 +185,4 @@ def stool(rng: Rng, posed: PosedBody) -> Surface:
     else:
         profile = [[r * 0.8, 0], [0.05, 0.05], [0.05, top - 0.06], [r, top - 0.05], [r, top], [0, top]]
         mesh = g.lathe(profile, [x, y, 0])
-    return Surface(mesh, m.wooden(rng) if rng.random() < 0.5 else m.plain(m.any_colour(rng), 0.4))
+    return Surface(mesh, m.wooden(rng) if rng.random() < 0.5 else m.plain(m.muted(rng), 0.4))

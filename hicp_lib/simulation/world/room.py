@@ -3,8 +3,9 @@
 World frame: z up, floor at z = 0, metres. The room is a box around the origin.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -91,9 +92,7 @@ class _Wall:
         return g.boxes(np.stack([points.min(axis=1), points.max(axis=1)], axis=1))
 
     def panel(self, u: tuple[float, float], v: tuple[float, float], w: float) -> g.Mesh:
-        across, up = (u[1] - u[0]) * self.u, np.array([0, 0, v[1] - v[0]])
-        mesh = g.quad(self.point(u[0], v[0], w), across, up)
-        return mesh if mesh.normals[0] @ self.inward > 0 else g.quad(mesh.vertices_m[1], -across, up)
+        return g.quad(self.point(u[0], v[0], w), (u[1] - u[0]) * self.u, np.array([0, 0, v[1] - v[0]]))
 
 
 def _shell(rng: Rng, half: np.ndarray, height: float, walls: list[_Wall]) -> list[Surface]:
@@ -206,29 +205,28 @@ def _shelf(rng: Rng, wall: _Wall, span: Span) -> list[Surface]:
     if standing:
         boards += [((b - 0.012, b + 0.012), (0, high), (0, depth)) for b in span]
         boards.append((span, (0, high), (0, 0.01)))
-    books: list[list] = [[] for _ in range(5)]  # by colour
-    for v in levels[:-1]:
-        for colour, book in _row_of_books(rng, span, v, depth, levels[1] - levels[0] - 0.04):
-            books[colour].append(book)
+    books = wall.boxes(
+        *chain(*(_row_of_books(rng, span, v, depth, levels[1] - levels[0]) for v in levels[:-1]))
+    )
     wood = m.wooden(rng) if rng.random() < 0.6 else m.plain(m.off_white(rng), 0.4)
-    coloured = [Surface(wall.boxes(*some), m.plain(m.any_colour(rng), 0.55)) for some in books if some]
-    return [Surface(wall.boxes(*boards), wood), *coloured]
+    colour = np.repeat(rng.integers(5, size=len(books.vertices_m) // 24), 24)[:, None].astype(np.float32)
+    coloured = m.one_of([m.muted(rng), *(m.any_colour(rng) for _ in range(4))], 0.55)
+    return [Surface(wall.boxes(*boards), wood), Surface(replace(books, coords=colour), coloured)]
 
 
-def _row_of_books(rng: Rng, span: Span, v: float, depth: float, room: float) -> Iterator[tuple[int, tuple]]:
-    """Books, boxes and gaps on a board at height `v`, at most `room` high: colour and span of each."""
-    u = span[0] + 0.03
-    while u < span[1] - 0.08:
-        if rng.random() < 0.15:
-            u += rng.uniform(0.05, 0.25)
-            continue
-        thick = rng.uniform(0.015, 0.05) if rng.random() < 0.85 else rng.uniform(0.12, 0.25)
-        if u + thick > span[1] - 0.02:
-            break
-        tall = min(rng.uniform(0.17, 0.29), room)
-        book = ((u, u + thick), (v + 0.012, v + tall), (0.015, depth - rng.uniform(0.01, 0.07)))
-        yield int(rng.integers(5)), book
-        u += thick + 0.002
+def _row_of_books(rng: Rng, span: Span, v: float, depth: float, room: float) -> np.ndarray:
+    """Books, boxes and gaps on a board at height `v`, the next `room` above: spans, (n, 3, 2)."""
+    n = int((span[1] - span[0]) / 0.015)  # more than fit
+    thick = np.where(rng.random(n) < 0.85, rng.uniform(0.015, 0.05, n), rng.uniform(0.12, 0.25, n))
+    gap = np.where(rng.random(n) < 0.15, rng.uniform(0.05, 0.25, n), 0.002)
+    end = span[0] + 0.03 + np.cumsum(gap + thick)
+    high = v + np.minimum(rng.uniform(0.17, 0.29, n), room - 0.04)
+    front = depth - rng.uniform(0.01, 0.07, n)
+    low, back = np.full(n, v + 0.012), np.full(n, 0.015)
+    spans = np.stack(
+        [np.stack(ends, axis=1) for ends in ((end - thick, end), (low, high), (back, front))], axis=1
+    )
+    return spans[end < span[1] - 0.02]
 
 
 # Objects on a wall: frequency, width (m), function that makes them.

@@ -129,7 +129,7 @@ def render_scene(
     rng = stream(split, seed, index)
     while True:
         stage = staged(rng, split)
-        frame = render(stage.world, stage.camera, rng)
+        frame = render(stage.world, stage.camera)
         people = annotate(stage, frame)
         if people:  # someone is visible
             return expose(frame.radiance, stage.sensor, rng, frame.person >= 0), people
@@ -146,18 +146,21 @@ def annotate(stage: Stage, frame: Frame) -> list[dict]:
     """
     rows = []
     for number, (person, identity) in enumerate(zip(stage.people, stage.identities, strict=True)):
-        v, u = np.nonzero(frame.person == number)
-        if len(u) == 0:
+        own = frame.person == number
+        if not own.any():
             continue
+        (left, right), (top, bottom) = (
+            np.flatnonzero(own.any(axis=axis))[[0, -1]].tolist() for axis in (0, 1)
+        )
         pixels, seen = keypoint_visibility(frame.rays, stage.camera, person.keypoints_m, number)
-        box = [int(u.min()), int(v.min()), int(np.ptp(u)) + 1, int(np.ptp(v)) + 1]
+        box = [left, top, right - left + 1, bottom - top + 1]
         keypoints = np.where(seen[:, None] > 0, np.column_stack([pixels, seen]), 0)
         last = [stage.camera.width_px - 1, stage.camera.height_px - 1, 2]
         keypoints = np.clip(keypoints.round(2), 0, last).tolist()
         # The middle of the keypoints, along the camera's z axis.
         away_m = round(float(np.median(project_world(stage.camera, person.keypoints_m)[1])), 3)
         about = {"distance_m": away_m, "identity": asdict(identity)}
-        rows.append({"bbox": box, "area": len(u), "keypoints": keypoints} | about)
+        rows.append({"bbox": box, "area": int(own.sum()), "keypoints": keypoints} | about)
     return rows
 
 

@@ -133,21 +133,21 @@ def _lighting(rng: Rng, room: Room, eye: np.ndarray) -> tuple[list[lights.Light]
     if room.windows and rng.random() < 0.7:
         centre, u, v, inward = room.windows[rng.integers(len(room.windows))]
         area = 4 * np.linalg.norm(u) * np.linalg.norm(v)
-        found.append(lights.Light(centre + 0.05 * inward, u, v, daylight * area * rng.uniform(3, 7), inward))
+        found.append(lights.Light(centre + 0.05 * inward, u, v, daylight * area * rng.uniform(4, 9), inward))
     height = room.height_m - 0.12
     if not found or rng.random() < 0.6:
         spot = rng.uniform(-1.2, 1.2, 2) + np.array([0, -0.6])
-        half_u, half_v, _ = rng.uniform(0.08, 0.5) * np.eye(3)
-        found.append(lights.Light(np.array([*spot, height]), half_u, half_v, lamp * rng.uniform(2.5, 6)))
+        half_u, half_v, _ = rng.uniform(0.2, 0.6) * np.eye(3)
+        found.append(lights.Light(np.array([*spot, height]), half_u, half_v, lamp * rng.uniform(3, 6)))
     if len(found) < 2 and rng.random() < 0.6:  # light from where the photographer stands
         spot = np.array([eye[0] + rng.uniform(-1.5, 1.5), eye[1], rng.uniform(1.6, 2.2)])
         centre = np.clip(spot, [*(-room.half_m), 0], [*room.half_m, 3])
         half_u, _, half_v = 0.35 * np.eye(3)
-        found.append(lights.Light(centre, half_u, half_v, daylight * rng.uniform(1.5, 5)))
-    base = daylight * rng.uniform(0.25, 0.6)
+        found.append(lights.Light(centre, half_u, half_v, daylight * rng.uniform(0.8, 2.5)))
+    base = daylight * rng.uniform(0.18, 0.42)
     side = np.array([rng.normal(), rng.normal() - 1, 0.2])
-    down = base * rng.uniform(0.45, 0.8)
-    return found, lights.Ambient(base * 1.1, down, base * 0.6, side / np.linalg.norm(side))
+    down = base * rng.uniform(0.35, 0.65)
+    return found, lights.Ambient(base, down, base, side / np.linalg.norm(side))
 
 
 def _temperature(warm_to_cool: float) -> np.ndarray:

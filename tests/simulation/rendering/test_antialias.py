@@ -20,7 +20,7 @@ def _seen():
     wall = g.quad([-9, 2, -9], [18, 0, 0], [0, 0, 18])
     grey = materials.plain(np.full(3, 0.5))
     scene = RayScene([Surface(board, grey, 0), Surface(wall, grey)])
-    trace = trace_image(scene, CAMERA.centre_m, image_directions(CAMERA), np.array([True, False]))
+    trace, _ = trace_image(scene, CAMERA.centre_m, image_directions(CAMERA), np.array([True, False]))
     return scene, trace, (trace.surface == 0).reshape(60, 80)
 
 

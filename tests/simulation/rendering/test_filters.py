@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from hicp_lib.simulation.rendering.filters import sum_within, tilt_by_height
-from hicp_lib.simulation.rendering.gbuffer import GBuffer
+from hicp_lib.simulation.rendering.gbuffer import GBuffer, View
+from hicp_lib.simulation.rendering.raycast import Trace
 
 ROWS, COLUMNS = 20, 24
 V, U = np.mgrid[:ROWS, :COLUMNS].astype(np.float32)
@@ -31,28 +32,28 @@ def test_sums_do_not_cross_to_another_surface_or_over_a_step(cause):
     assert (sums[:, :12] == 0).all() and (sums[:, 12:] > 0).all()
 
 
-def _view(surface: np.ndarray) -> GBuffer:
-    pixels = np.flatnonzero(surface.ravel() >= 0)
-    n = len(pixels)
-    depth_m = np.ones((ROWS, COLUMNS), np.float32)
-    return GBuffer(pixels, surface, depth_m, FLAT, np.zeros((3, n)), np.zeros(n, int), np.zeros((n, 2)))
-
-
 def test_a_slope_of_heights_turns_the_normal_against_it():
-    normals, slope = UP.astype(np.float32), 0.5
-    height_m = (0.01 + slope * FLAT[0]).astype(np.float32)
-    surface = np.where(U < 12, 0, 1).astype(np.int16)
-    tilt_by_height(normals, height_m, _view(surface))
+    surface = np.where(U < 12, 0, 1).astype(np.int16).ravel()
+    nothing = np.zeros(len(surface), np.int32), surface, np.zeros((len(surface), 2), np.float32)
+    trace = Trace(np.ones(len(surface), np.float32), *nothing)
+    seen = GBuffer.of(View(trace, np.zeros(3, np.float32), FLAT), np.ones((ROWS, COLUMNS), bool))
+    normals, slope = UP.reshape(3, -1)[:, seen.pixels].astype(np.float32), 0.5
+    height_m = (0.01 + slope * FLAT[0].ravel()[seen.pixels]).astype(np.float32)
+    tilted = np.empty((3, ROWS, COLUMNS))
+    tilted.reshape(3, -1)[:, seen.pixels] = tilt_by_height(normals, height_m, seen)
     expected = np.array([-slope, 0, 1]) / np.hypot(slope, 1)
-    inner = normals[:, :-1, np.r_[:11, 12 : COLUMNS - 1]]
+    inner = tilted[:, :-1, np.r_[:11, 12 : COLUMNS - 1]]
     assert np.abs(inner - expected[:, None, None]).max() < 1e-4
-    assert (normals[:, :, 11] == UP[:, :, 11]).all()  # beside another surface
+    assert (tilted[:, :, 11] == UP[:, :, 11]).all()  # beside another surface
+    assert (tilted[:, -1] == UP[:, -1]).all() and (tilted[:, :, -1] == UP[:, :, -1]).all()
 
 
-def test_values_come_back_from_the_grid():
-    surface = np.where((U + V) % 3 == 0, 0, -1).astype(np.int16)
-    view = _view(surface)
-    values = np.random.default_rng(0).random((2, len(view.pixels)), np.float32)
-    grid = view.on_grid(values)
-    assert grid.shape == (2, ROWS, COLUMNS) and (grid[:, surface < 0] == 0).all()
-    assert (view.from_grid(grid) == values).all()
+def test_pixels_lie_surface_by_surface():
+    surface = np.where(U < 12, 3, -1).astype(np.int16)
+    surface[:5, :5] = 1
+    trace = Trace(
+        np.ones(surface.size, np.float32), surface.ravel(), surface.ravel(), np.zeros((surface.size, 2))
+    )
+    seen = GBuffer.of(View(trace, np.zeros(3, np.float32), FLAT), V < 10)
+    assert [(number, len(seen.pixels[part])) for number, part in seen.parts] == [(1, 25), (3, 95)]
+    assert all((surface.ravel()[seen.pixels[part]] == number).all() for number, part in seen.parts)

@@ -10,10 +10,10 @@ from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.simulation.rendering import lights
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.camera import PlacedCamera, image_directions, look_at
-from hicp_lib.simulation.rendering.gbuffer import GBuffer, evaluate_materials
+from hicp_lib.simulation.rendering.gbuffer import GBuffer, View
 from hicp_lib.simulation.rendering.raycast import RayScene, trace_image
 from hicp_lib.simulation.rendering.render import World, render
-from hicp_lib.simulation.rendering.shadows import visibility
+from hicp_lib.simulation.rendering.shadows import from_half, visibility
 from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
@@ -35,7 +35,7 @@ def _world(surfaces):
 def test_depth_is_that_of_the_plane_and_the_sphere():
     wall = Surface(g.quad([-5, 2, -5], [10, 0, 0], [0, 0, 10]), GREY)
     ball = Surface(_sphere([0, 0, 1], 0.5), GREY, person=0)
-    frame = render(_world([wall, ball]), CAMERA, np.random.default_rng(0))
+    frame = render(_world([wall, ball]), CAMERA)
     v, u = np.mgrid[:60, :80]
     x, y = (u - 39.5) / 70, (v - 29.5) / 70
     a, b = x * x + y * y + 1, 3.0  # |t (x, y, 1) - (0, 0, 3)| = 0.5
@@ -49,7 +49,7 @@ def test_depth_is_that_of_the_plane_and_the_sphere():
 
 def test_a_tilted_plane_has_exact_depth_where_nothing_was_traced():
     floor = Surface(g.quad([-9, -9, 0], [18, 0, 0], [0, 18, 0]), GREY)
-    frame = render(_world([floor]), CAMERA, np.random.default_rng(0))
+    frame = render(_world([floor]), CAMERA)
     rows = np.arange(36, 60)
     expected = 70 / (rows - 29.5)  # one metre below the camera
     assert np.abs(frame.depth_m[rows] - expected[:, None]).max() < 1e-4
@@ -65,10 +65,8 @@ def test_shadows_are_dark_and_light_is_not_below_zero():
         np.array([0.0, -0.1, 3]), np.array([0.1, 0, 0]), np.array([0, 0.1, 0]), np.full(3, 9.0)
     )
     world = World([floor, roof], [lamp], _world([]).ambient, np.zeros(3))
-    image = render(world, camera, np.random.default_rng(0)).radiance[..., 1]
-    lit = render(
-        World([floor], [lamp], world.ambient, np.zeros(3)), camera, np.random.default_rng(0)
-    ).radiance[..., 1]
+    image = render(world, camera).radiance[..., 1]
+    lit = render(World([floor], [lamp], world.ambient, np.zeros(3)), camera).radiance[..., 1]
     assert image.min() >= 0
     assert image[30, 40] < 0.5 * lit[30, 40]
     assert image[55, 5] == pytest.approx(lit[55, 5], rel=0.1)
@@ -79,8 +77,8 @@ def test_frames_of_one_world_are_those_of_worlds_made_anew():
     kept = _world([ball])
     for eye in ([0, -3, 1], [1, -3, 1.5]):
         camera = PlacedCamera(80, 60, 70.0, 70.0, 39.5, 29.5, look_at(eye, [0, 0, 1]))
-        again = render(kept, camera, np.random.default_rng(1))
-        fresh = render(_world([ball]), camera, np.random.default_rng(1))
+        again = render(kept, camera)
+        fresh = render(_world([ball]), camera)
         assert (again.radiance == fresh.radiance).all() and (again.depth_m == fresh.depth_m).all()
         assert again.rays is kept.rays
 
@@ -90,12 +88,34 @@ def test_a_ball_alone_is_in_nobodys_shadow():
     lamp = lights.Light(np.array([3.0, -3, 1]), np.array([0.1, 0, 0]), np.array([0, 0, 0.1]), np.ones(3))
     scene = RayScene([Surface(_sphere([0, 0, 1], 0.5), GREY, person=0)])
     directions = image_directions(CAMERA)
-    trace = trace_image(scene, CAMERA.centre_m, directions, np.array([True]))
-    view = GBuffer.of(trace, CAMERA.centre_m, directions, np.s_[:, :], np.ones((60, 80), bool))
-    normals = view.on_grid(evaluate_materials(scene, view, 1 / 70).normals)
-    seen = visibility([lamp], scene, view, normals, True, np.random.default_rng(0))
-    assert seen.shape == (2, len(view.pixels)) and len(view.pixels) > 400
+    trace, _ = trace_image(scene, CAMERA.centre_m, directions, np.array([True]))
+    view = View(trace, CAMERA.centre_m.astype(np.float32), directions)
+    ball = GBuffer.of(view, np.ones((60, 80), bool))
+    seen = visibility([lamp], scene, [ball], [ball.normals(scene)])
+    assert seen.shape == (2, 60 * 80) and len(ball.pixels) > 400
     assert (seen == 1).all()
+
+
+def test_values_of_every_second_pixel_stay_within_their_surface():
+    board = Surface(g.quad([-0.3, 0, 0.6], [0.6, 0, 0.1], [0, 0, 0.8]), GREY, person=0)
+    wall = Surface(g.quad([-5, 2, -5], [10, 0, 0], [0, 0, 10]), GREY)
+    scene, directions = RayScene([board, wall]), image_directions(CAMERA)
+    full, coarse = trace_image(scene, CAMERA.centre_m, directions, np.array([True, False]))
+    view, half = (
+        View(trace, CAMERA.centre_m, rays)
+        for trace, rays in ((full, directions), (coarse, directions[:, ::2, ::2]))
+    )
+    pixels = GBuffer.of(view, np.ones((60, 80), bool))
+    row, column = np.mgrid[:30, :40]
+    values = np.stack([coarse.surface, 2 * (row + column).ravel()]).astype(np.float32)
+    surface, place = from_half(values, half, pixels)
+    assert np.abs(surface - full.surface[pixels.pixels]).max() < 1e-3
+    shown = full.surface.reshape(60, 80)[:58, :78]
+    around = [np.roll(shown, (dv, du), (0, 1)) for dv in (-1, 0, 1) for du in (-1, 0, 1)]
+    inner = np.zeros((60, 80), bool)
+    inner[1:57, 1:77] = (np.ptp(around, axis=0) == 0)[1:57, 1:77]
+    expected = np.add(*np.divmod(pixels.pixels, 80))
+    assert inner.sum() > 3000 and np.abs(place - expected)[inner.ravel()[pixels.pixels]].max() < 0.05
 
 
 @pytest.fixture(scope="module")
