@@ -1,7 +1,6 @@
 """The G-buffer: geometry and material of what pixels show, where their rays met it."""
 
 from dataclasses import dataclass, fields
-from functools import cached_property
 
 import numpy as np
 
@@ -36,67 +35,79 @@ class View:
         return self.trace.depth_m.take(pixels, mode="clip") * pick(self.directions.reshape(3, -1), pixels)
 
 
-@dataclass(frozen=True)
+def from_half(values: np.ndarray, half: View, view: View, pixels: np.ndarray) -> np.ndarray:
+    """Values at every second row and column, interpolated to pixels within the surfaces these show.
+
+    Parameters
+    ----------
+    values : array, shape (k, n_half), dtype float32
+    half, view : View
+        The first is every second row and column of the other.
+    pixels : array of int, shape (n,)
+        Numbers in the view.
+
+    Returns
+    -------
+    array, shape (k, n), dtype float32
+        Where no neighbour shows a pixel's surface, that of the nearest.
+    """
+    row, column = np.divmod(pixels, view.shape[1])
+    surface = view.trace.surface.take(pixels)
+    total = np.float32(1e-3) * pick(values, row // 2 * half.shape[1] + column // 2)
+    weight = np.full(len(row), 1e-3, np.float32)
+    for below in (0, 1):
+        start = np.minimum((row + below) // 2, half.shape[0] - 1) * half.shape[1]
+        for right in (0, 1):
+            near = start + np.minimum((column + right) // 2, half.shape[1] - 1)
+            alike = half.trace.surface.take(near) == surface
+            total += alike * pick(values, near)
+            weight += alike
+    return total / weight
+
+
 class GBuffer:
     """Geometry seen at n of a view's pixels, surface by surface.
 
-    Attributes
+    Parameters
     ----------
     view : View
+    wanted : array of bool, shape (rows, columns)
+        Pixels that count if they show something.
+
+    Attributes
+    ----------
     pixels : array of int, shape (n,)
         Their numbers in the view, row by row.
     parts : list of tuple
         Numbers of the surfaces that are seen, and which of the n pixels show each.
+    directions, offsets_m : array, shape (3, n)
+        Of the pixels' rays, and from the view's centre to what they met.
+    depth_m : array, shape (n,)
+        Along the camera's z axis.
+    triangle, weights : array, shape (n,) and (n, 3)
+        What they met, and the weights of its corners there.
     """
 
-    view: View
-    pixels: np.ndarray
-    parts: list[tuple[int, slice]]
-
-    @classmethod
-    def of(cls, view: View, wanted: np.ndarray) -> "GBuffer":
-        """Of the pixels that are `wanted`, (rows, columns), and show something."""
-        pixels = np.flatnonzero(wanted.ravel() & (view.trace.surface >= 0))
-        surface = view.trace.surface.take(pixels)
-        parts, start = [], 0
-        for number, n in enumerate(np.bincount(surface).tolist()):
-            if n:
-                parts.append((number, slice(start, start + n)))
-            start += n
-        return cls(view, pixels.take(np.argsort(surface, kind="stable")), parts)
-
-    @cached_property
-    def directions(self) -> np.ndarray:
-        """Of the pixels' rays, (3, n)."""
-        return pick(self.view.directions.reshape(3, -1), self.pixels)
-
-    @cached_property
-    def offsets_m(self) -> np.ndarray:
-        """From the view's centre to what is seen, (3, n)."""
-        return self.depth_m * self.directions
+    def __init__(self, view: View, wanted: np.ndarray):
+        trace, pixels = view.trace, np.flatnonzero(wanted.ravel() & (view.trace.surface >= 0))
+        surface = trace.surface.take(pixels)
+        self.view, self.pixels = view, pixels.take(np.argsort(surface, kind="stable"))
+        n_each = np.bincount(surface)
+        ends = np.cumsum(n_each)
+        numbers = np.flatnonzero(n_each).tolist()
+        self.parts = [(number, slice(ends[number] - n_each[number], ends[number])) for number in numbers]
+        self.depth_m = trace.depth_m.take(self.pixels)
+        self.directions = pick(view.directions.reshape(3, -1), self.pixels)
+        self.offsets_m = self.depth_m * self.directions
+        self.triangle = trace.triangle.take(self.pixels)
+        self.weights = np.empty((len(pixels), 3), np.float32)
+        self.weights[:, 1:] = trace.barycentric.take(self.pixels, axis=0)
+        np.subtract(1 - self.weights[:, 1], self.weights[:, 2], out=self.weights[:, 0])
 
     @property
     def positions_m(self) -> np.ndarray:
         """Of what is seen, world frame, (3, n)."""
         return self.offsets_m + self.view.centre_m[:, None]
-
-    @cached_property
-    def depth_m(self) -> np.ndarray:
-        """Along the camera's z axis, (n,)."""
-        return self.view.trace.depth_m.take(self.pixels)
-
-    @cached_property
-    def triangle(self) -> np.ndarray:
-        """Number of the triangle that each ray met, (n,)."""
-        return self.view.trace.triangle.take(self.pixels)
-
-    @cached_property
-    def weights(self) -> np.ndarray:
-        """Of the triangles' corners where the rays met them, (n, 3), float32."""
-        weights = np.empty((len(self.pixels), 3), np.float32)
-        weights[:, 1:] = self.view.trace.barycentric.take(self.pixels, axis=0)
-        np.subtract(1 - weights[:, 1], weights[:, 2], out=weights[:, 0])
-        return weights
 
     def normals(self, scene: RayScene) -> np.ndarray:
         """Interpolated between vertices; they face the camera, (3, n)."""

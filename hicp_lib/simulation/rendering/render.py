@@ -9,10 +9,10 @@ import numpy as np
 from hicp_lib.simulation.rendering.antialias import edge_pixels, smooth_edges
 from hicp_lib.simulation.rendering.camera import PlacedCamera, image_directions
 from hicp_lib.simulation.rendering.filters import tilt_by_height
-from hicp_lib.simulation.rendering.gbuffer import GBuffer, Shading, View, evaluate_materials
+from hicp_lib.simulation.rendering.gbuffer import GBuffer, Shading, View, evaluate_materials, from_half
 from hicp_lib.simulation.rendering.lights import Ambient, Light, ambient_light, diffuse_and_highlight
 from hicp_lib.simulation.rendering.raycast import RayScene, dot, doubled, pick, place, trace_image
-from hicp_lib.simulation.rendering.shadows import from_half, visibility
+from hicp_lib.simulation.rendering.shadows import visibility
 from hicp_lib.simulation.rendering.surfaces import Surface, column
 
 _BLOCK = 16_384  # pixels shaded at a time, to fit the processor's cache
@@ -97,18 +97,19 @@ def render(world: World, camera: PlacedCamera) -> Frame:
     trace, half_trace = trace_image(scene, centre_m, directions, scene.owners[:-1] >= 0)
     person = scene.owners.take(trace.surface, mode="wrap").reshape(shape)
     is_person = person >= 0
+    view = View(trace, centre_m, directions)
     half = View(half_trace, centre_m, np.ascontiguousarray(directions[:, ::2, ::2]))
-    coarse = [GBuffer.of(half, wanted[::2, ::2]) for wanted in (~is_person, is_person)]
+    coarse = [GBuffer(half, wanted[::2, ::2]) for wanted in (~is_person, is_person)]
     normals = [part.normals(scene) for part in coarse]
     seen = visibility(world.lights, scene, coarse, normals)
     around, _ = coarse
     painted = _paint(world, around, normals[0], camera, pick(seen, around.pixels))
-    image = _enlarge(painted, around, trace.surface.reshape(shape), ~is_person)
+    image = _enlarge(painted, around, view, ~is_person)
     pixels = image.reshape(-1, 3).T
     place(pixels, np.flatnonzero(trace.surface < 0), column(world.backdrop))
     if is_person.any():
-        people = GBuffer.of(View(trace, centre_m, directions), is_person)
-        lit = from_half(seen, half, people)
+        people = GBuffer(view, is_person)
+        lit = from_half(seen, half, view, people.pixels)
         place(pixels, people.pixels, _paint(world, people, people.normals(scene), camera, lit))
         image = smooth_edges(image, edge_pixels(trace, is_person), trace, scene, camera)
     return Frame(image, trace.depth_m.reshape(shape), person, scene)
@@ -148,35 +149,23 @@ def _shade_block(world: World, shading: Shading, positions_m, direction, seen: n
     return diffuse
 
 
-def _enlarge(painted: np.ndarray, around: GBuffer, surface: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def _enlarge(painted: np.ndarray, around: GBuffer, view: View, wanted: np.ndarray) -> np.ndarray:
     """From every second pixel to all, (height, width, 3), out of focus; colours run on under people.
 
-    Each `wanted` pixel takes the colour (3, n) of the nearest painted one that shows the same
-    surface, so that outlines stay where they are.
+    The `wanted` pixels take the colours (3, n) of painted ones that show the same surface, so that outlines
+    stay where they are.
     """
-    shape = around.view.shape
-    coarse, shown = np.zeros((*shape, 4), np.float32), np.full(shape, -1, np.int16)
+    half = around.view
+    coarse = np.zeros((*half.shape, 4), np.float32)
     place(coarse.reshape(-1, 4).T, around.pixels, [*painted, np.float32(1)])
-    shown.ravel()[around.pixels] = around.view.trace.surface.take(around.pixels)
-    empty = np.flatnonzero(shown < 0)
+    empty = np.flatnonzero(coarse[..., 3] == 0)
     *near, weight = cv2.blur(coarse, (9, 9)).reshape(-1, 4).take(empty, axis=0).T
+    place(coarse.reshape(-1, 4).T, empty, [*near / np.maximum(weight, np.float32(1e-9)), np.float32(1)])
     colours = np.ascontiguousarray(coarse[..., :3])
-    place(colours.reshape(-1, 3).T, empty, near / np.maximum(weight, np.float32(1e-9)))
-    full = doubled(colours, surface.shape)
-    wrong, best = _nearest_alike(shown, surface, wanted)
-    full.reshape(-1, 3)[wrong] = colours.reshape(-1, 3).take(best, axis=0)
+    full = doubled(colours, view.shape)
+    differs = doubled(half.trace.surface.reshape(half.shape), view.shape) != view.trace.surface.reshape(
+        view.shape
+    )
+    wrong = np.flatnonzero(differs & wanted)
+    place(full.reshape(-1, 3).T, wrong, from_half(colours.reshape(-1, 3).T, half, view, wrong))
     return cv2.GaussianBlur(full, (7, 7), 1.1)
-
-
-def _nearest_alike(coarse: np.ndarray, surface: np.ndarray, wanted: np.ndarray):
-    """Pixels whose coarse one shows another surface, and which coarse pixel to take instead, (n,) both."""
-    wrong = np.flatnonzero((doubled(coarse, surface.shape) != surface) & wanted)
-    padded = np.pad(coarse, 1, constant_values=-2)
-    row, column = (numbers // 2 for numbers in np.divmod(wrong, surface.shape[1]))
-    middle = (row + 1) * padded.shape[1] + column + 1
-    best, own = middle.copy(), surface.ravel().take(wrong)
-    for dv, du in ((-1, -1), (-1, 1), (1, -1), (1, 1), (-1, 0), (0, -1), (1, 0), (0, 1)):
-        near = middle + (dv * padded.shape[1] + du)
-        np.copyto(best, near, where=padded.ravel().take(near) == own)
-    row, column = np.divmod(best, padded.shape[1])
-    return wrong, (row - 1) * coarse.shape[1] + column - 1

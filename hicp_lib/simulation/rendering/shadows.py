@@ -5,7 +5,7 @@ import numpy as np
 from hicp_lib.simulation.rendering import lights
 from hicp_lib.simulation.rendering.camera import join_rays
 from hicp_lib.simulation.rendering.filters import sum_within
-from hicp_lib.simulation.rendering.gbuffer import GBuffer, View
+from hicp_lib.simulation.rendering.gbuffer import GBuffer
 from hicp_lib.simulation.rendering.raycast import RayScene, dot, pick, place
 from hicp_lib.simulation.rendering.surfaces import column
 
@@ -55,35 +55,6 @@ def visibility(
     sums = sum_within(counts.reshape(shape), *around, _ROUNDS)
     *seen, weight = sums.reshape(len(sums), -1).astype(np.float32)
     return np.where(weight > 0, np.stack(seen) / np.maximum(weight, 1), np.float32(1))
-
-
-def from_half(values: np.ndarray, half: View, gbuffer: GBuffer) -> np.ndarray:
-    """Values at every second row and column, interpolated to pixels within the surfaces they show.
-
-    Parameters
-    ----------
-    values : array, shape (k, n_half), dtype float32
-    half : View
-        Every second row and column of the G-buffer's.
-    gbuffer : GBuffer
-
-    Returns
-    -------
-    array, shape (k, n), dtype float32
-        Where no neighbour shows a pixel's surface, that of the nearest.
-    """
-    row, column = np.divmod(gbuffer.pixels, gbuffer.view.shape[1])
-    surface = gbuffer.view.trace.surface.take(gbuffer.pixels)
-    total = np.float32(1e-3) * pick(values, row // 2 * half.shape[1] + column // 2)
-    weight = np.full(len(row), 1e-3, np.float32)
-    for below in (0, 1):
-        start = np.minimum((row + below) // 2, half.shape[0] - 1) * half.shape[1]
-        for right in (0, 1):
-            near = start + np.minimum((column + right) // 2, half.shape[1] - 1)
-            alike = half.trace.surface.take(near) == surface
-            total += alike * pick(values, near)
-            weight += alike
-    return total / weight
 
 
 def _sees(scene: RayScene, source: lights.Light | None, origins_m, normals, offsets) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 from hicp_lib.simulation.appearance.people import RIGHT
 from hicp_lib.simulation.body.model import REGIONS
 from hicp_lib.simulation.rendering.camera import PlacedCamera, image_directions, join_rays, pixel_rays
-from hicp_lib.simulation.rendering.raycast import RayScene, doubled
+from hicp_lib.simulation.rendering.raycast import RayScene, between, doubled
 from hicp_lib.simulation.sensors.depth_alignment import align_to_colour
 
 Rng = np.random.Generator
@@ -162,28 +162,22 @@ def _true_disparity(
     coarse_shape = directions.shape[1:]
     trace = scene.trace(join_rays(view.centre_m, directions.reshape(3, -1)))
     coarse = (np.float32(focal_baseline) / trace.depth_m).reshape(coarse_shape)
-    # OpenCV's resizing puts the samples elsewhere: means of neighbours by hand.
-    full = np.empty(shape, np.float32)
-    full[::2, ::2] = coarse
-    right, below = np.roll(coarse, -1, axis=1), np.roll(coarse, -1, axis=0)
-    full[::2, 1::2] = ((coarse + right) / 2)[:, : shape[1] // 2]
-    full[1::2, ::2] = ((coarse + below) / 2)[: shape[0] // 2]
-    full[1::2, 1::2] = ((right + below) / 2)[: shape[0] // 2, : shape[1] // 2]
+    full = between(coarse, *shape)
     unknown = doubled(_bent(coarse), shape)
-    unknown[::2, ::2] = False
+    unknown[::2, ::2] = 0
     rows, columns = np.nonzero(unknown)
     rays = pixel_rays(view, np.stack([columns, rows], axis=1))
     full[rows, columns] = focal_baseline / scene.trace(rays).depth_m
     is_hair = np.array([s.parts is not None and np.isin(s.parts, _HAIR_PARTS).all() for s in scene.surfaces])
     hair = np.append(is_hair, False)[trace.surface].reshape(coarse_shape)
-    return full, doubled(hair, shape)
+    return full, doubled(hair.view(np.uint8), shape).view(bool)
 
 
 def _bent(coarse_px: np.ndarray) -> np.ndarray:
-    """Where disparity is not linear, or the image ends."""
+    """Where disparity is not linear, or the image ends; 0 or 1."""
     bent = np.ones(coarse_px.shape, np.uint8)
     inner = coarse_px[1:-1, 1:-1]
     across = np.abs(coarse_px[1:-1, :-2] + coarse_px[1:-1, 2:] - 2 * inner)
     down = np.abs(coarse_px[:-2, 1:-1] + coarse_px[2:, 1:-1] - 2 * inner)
     bent[1:-1, 1:-1] = np.maximum(across, down) > _CURVED_PX
-    return cv2.dilate(bent, np.ones((3, 3), np.uint8)).astype(bool)
+    return cv2.dilate(bent, np.ones((3, 3), np.uint8))

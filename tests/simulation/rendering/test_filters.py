@@ -36,7 +36,7 @@ def test_a_slope_of_heights_turns_the_normal_against_it():
     surface = np.where(U < 12, 0, 1).astype(np.int16).ravel()
     nothing = np.zeros(len(surface), np.int32), surface, np.zeros((len(surface), 2), np.float32)
     trace = Trace(np.ones(len(surface), np.float32), *nothing)
-    seen = GBuffer.of(View(trace, np.zeros(3, np.float32), FLAT), np.ones((ROWS, COLUMNS), bool))
+    seen = GBuffer(View(trace, np.zeros(3, np.float32), FLAT), np.ones((ROWS, COLUMNS), bool))
     normals, slope = UP.reshape(3, -1)[:, seen.pixels].astype(np.float32), 0.5
     height_m = (0.01 + slope * FLAT[0].ravel()[seen.pixels]).astype(np.float32)
     tilted = np.empty((3, ROWS, COLUMNS))
@@ -54,6 +54,6 @@ def test_pixels_lie_surface_by_surface():
     trace = Trace(
         np.ones(surface.size, np.float32), surface.ravel(), surface.ravel(), np.zeros((surface.size, 2))
     )
-    seen = GBuffer.of(View(trace, np.zeros(3, np.float32), FLAT), V < 10)
+    seen = GBuffer(View(trace, np.zeros(3, np.float32), FLAT), V < 10)
     assert [(number, len(seen.pixels[part])) for number, part in seen.parts] == [(1, 25), (3, 95)]
     assert all((surface.ravel()[seen.pixels[part]] == number).all() for number, part in seen.parts)

@@ -10,10 +10,10 @@ from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.simulation.rendering import lights
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.camera import PlacedCamera, image_directions, look_at
-from hicp_lib.simulation.rendering.gbuffer import GBuffer, View
+from hicp_lib.simulation.rendering.gbuffer import GBuffer, View, from_half
 from hicp_lib.simulation.rendering.raycast import RayScene, trace_image
 from hicp_lib.simulation.rendering.render import World, render
-from hicp_lib.simulation.rendering.shadows import from_half, visibility
+from hicp_lib.simulation.rendering.shadows import visibility
 from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
@@ -90,7 +90,7 @@ def test_a_ball_alone_is_in_nobodys_shadow():
     directions = image_directions(CAMERA)
     trace, _ = trace_image(scene, CAMERA.centre_m, directions, np.array([True]))
     view = View(trace, CAMERA.centre_m.astype(np.float32), directions)
-    ball = GBuffer.of(view, np.ones((60, 80), bool))
+    ball = GBuffer(view, np.ones((60, 80), bool))
     seen = visibility([lamp], scene, [ball], [ball.normals(scene)])
     assert seen.shape == (2, 60 * 80) and len(ball.pixels) > 400
     assert (seen == 1).all()
@@ -105,10 +105,10 @@ def test_values_of_every_second_pixel_stay_within_their_surface():
         View(trace, CAMERA.centre_m, rays)
         for trace, rays in ((full, directions), (coarse, directions[:, ::2, ::2]))
     )
-    pixels = GBuffer.of(view, np.ones((60, 80), bool))
+    pixels = GBuffer(view, np.ones((60, 80), bool))
     row, column = np.mgrid[:30, :40]
     values = np.stack([coarse.surface, 2 * (row + column).ravel()]).astype(np.float32)
-    surface, place = from_half(values, half, pixels)
+    surface, place = from_half(values, half, view, pixels.pixels)
     assert np.abs(surface - full.surface[pixels.pixels]).max() < 1e-3
     shown = full.surface.reshape(60, 80)[:58, :78]
     around = [np.roll(shown, (dv, du), (0, 1)) for dv in (-1, 0, 1) for du in (-1, 0, 1)]
