@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hicp_lib.core.camera import Camera, project
+from hicp_lib.simulation.rendering.mesh import unit
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,8 @@ def look_at(eye_m: ArrayLike, target_m: ArrayLike, roll_rad: float = 0.0) -> np.
     >>> pixel_px.round(6), float(depth_m)
     (array([31.5, 23.5]), 3.0)
     """
-    forward = _unit(np.asarray(target_m, float) - np.asarray(eye_m, float))
-    right = _unit(np.cross(forward, [0.0, 0.0, 1.0]))
+    forward = unit(np.asarray(target_m, float) - np.asarray(eye_m, float))
+    right = unit(np.cross(forward, [0.0, 0.0, 1.0]))
     down = np.cross(forward, right)
     cos, sin = np.cos(roll_rad), np.sin(roll_rad)
     T_world_camera = np.eye(4)
@@ -131,7 +132,3 @@ def project_world(camera: PlacedCamera, points_m: np.ndarray) -> tuple[np.ndarra
     """
     in_camera_m = (np.asarray(points_m, float) - camera.centre_m) @ camera.T_world_camera[:3, :3]
     return project(camera, in_camera_m), in_camera_m[..., 2]
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)

@@ -31,8 +31,9 @@ class View:
         return self.directions.shape[1:]
 
     def offsets_m(self, pixels: np.ndarray) -> np.ndarray:
-        """From the centre to what is seen at pixels (n,), (3, n)."""
-        return self.trace.depth_m.take(pixels, mode="clip") * pick(self.directions.reshape(3, -1), pixels)
+        """From the centre to what is seen at pixels (n,), (3, n); 1 km away where nothing is."""
+        depth_m = np.minimum(self.trace.depth_m.take(pixels, mode="clip"), np.float32(1e3))
+        return depth_m * pick(self.directions.reshape(3, -1), pixels)
 
 
 def from_half(values: np.ndarray, half: View, view: View, pixels: np.ndarray) -> np.ndarray:

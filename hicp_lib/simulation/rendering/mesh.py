@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
+from hicp_lib.core.rotations import about
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -245,10 +247,9 @@ def turned(mesh: Mesh, yaw_rad: float, about_m: ArrayLike) -> Mesh:
     """
     if yaw_rad == 0:
         return mesh
-    c, s = np.cos(yaw_rad), np.sin(yaw_rad)
-    R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], np.float32)
-    about = np.asarray(about_m, np.float32)
-    return Mesh((mesh.vertices_m - about) @ R.T + about, mesh.triangles, mesh.normals @ R.T, mesh.coords)
+    R, middle = about(2, yaw_rad).astype(np.float32), np.asarray(about_m, np.float32)
+    vertices_m = (mesh.vertices_m - middle) @ R.T + middle
+    return replace(mesh, vertices_m=vertices_m, normals=mesh.normals @ R.T)
 
 
 def lathe(profile_m: np.ndarray | Sequence[Sequence[float]], centre_m: ArrayLike, n_sides: int = 24) -> Mesh:

@@ -152,7 +152,7 @@ def trace_image(
     triangle = coarse.triangle.reshape(coarse_shape)
     inner = (triangle >= 0) & ~np.append(fine, False).take(coarse.surface, mode="wrap").reshape(coarse_shape)
     plain = _inside_one(triangle, inner)
-    depth_m = between(1 / coarse.depth_m.reshape(coarse_shape), height, width)
+    depth_m = between(1 / coarse.depth_m.reshape(coarse_shape), (height, width))
     with np.errstate(divide="ignore"):  # infinite where nothing is
         np.reciprocal(depth_m, out=depth_m)
     depth_m[every_second] = coarse.depth_m.reshape(coarse_shape)
@@ -189,14 +189,14 @@ def doubled(values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     return np.ascontiguousarray(full[: shape[0], : shape[1]])
 
 
-def between(values: np.ndarray, height: int, width: int) -> np.ndarray:
-    """Values at every second row and column, and the means between them, (height, width)."""
+def between(values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Values at every second row and column, and the means between them, float32; `shape` is that of all."""
     full = np.zeros((2 * values.shape[0], 2 * values.shape[1]), np.float32)
     full[::2, ::2] = values
     full[::2, 1:-1:2] = (values[:, :-1] + values[:, 1:]) / 2
     full[1:-1:2, ::2] = (values[:-1] + values[1:]) / 2
     full[1:-1:2, 1:-1:2] = (values[:-1, :-1] + values[1:, 1:]) / 2
-    return full[:height, :width]
+    return full[: shape[0], : shape[1]]
 
 
 def interpolate(values: np.ndarray, corners: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -162,7 +162,7 @@ def _true_disparity(
     coarse_shape = directions.shape[1:]
     trace = scene.trace(join_rays(view.centre_m, directions.reshape(3, -1)))
     coarse = (np.float32(focal_baseline) / trace.depth_m).reshape(coarse_shape)
-    full = between(coarse, *shape)
+    full = between(coarse, shape)
     unknown = doubled(_bent(coarse), shape)
     unknown[::2, ::2] = 0
     rows, columns = np.nonzero(unknown)

@@ -6,6 +6,7 @@ from itertools import chain
 import numpy as np
 
 from hicp_lib.core.keypoints import INDEX
+from hicp_lib.core.rotations import about
 from hicp_lib.simulation.appearance.materials import hsv
 from hicp_lib.simulation.appearance.people import appearance_of, dress
 from hicp_lib.simulation.body.identities import HELD_OUT, PEOPLE, Identity, Rng, draw_identity
@@ -98,7 +99,7 @@ def _person(identity: Identity, place: tuple[float, float], number: int) -> tupl
     turns = [rng.normal(0, 0.45), rng.uniform(-1.8, 1.8), rng.uniform(-np.pi, np.pi)]
     yaw = -np.pi / 2 + rng.choice(turns, p=[0.76, 0.17, 0.07])
     T_world_body = np.eye(4)
-    T_world_body[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
+    T_world_body[:3, :3] = about(2, yaw)
     T_world_body[:2, 3] = place
     kind = str(rng.choice(list(PEOPLE["photographed"]), p=list(PEOPLE["photographed"].values())))
     if kind == "sitting" and appearance.skirt is not None:  # a skirt would have to drape over the seat
