@@ -26,11 +26,10 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.core.keypoints import COCO_17, to_halpe
 from hicp_lib.detectors.combined.arbitration import Hands, give_hands, in_pairs, nearest_first
+from hicp_lib.detectors.combined.hand_squares import WRISTS
 from hicp_lib.detectors.mediapipe import bundles, child
 from hicp_lib.detectors.mediapipe.program import program_folder, program_version
 from hicp_lib.detectors.runtime.isolation import IsolatedProcess
-
-_WRISTS = [9, 10]
 
 
 class _Task:
@@ -88,8 +87,6 @@ class MediaPipePose(_Task):
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
         people = self._process.ask(image)
-        if not len(people):
-            return Detections.none()
         scores = to_halpe(np.clip(people[..., 2], 0, 1), "mediapipe_pose33", axis=-1, fill=0.0)
         keypoints_px = to_halpe(_positions_px(people[..., :2], image), "mediapipe_pose33", axis=-2)
         return Detections(keypoints_px, scores, scores[:, COCO_17].mean(axis=1))
@@ -127,8 +124,6 @@ class MediaPipeHands(_Task):
     def detect(self, image: np.ndarray) -> Detections:
         """Find hands in an RGB image, shape (height, width, 3), uint8, paired into instances."""
         hands = self._process.ask(image)
-        if not len(hands):
-            return Detections.none()
         scores = np.repeat(np.minimum(hands[:, :1, 1], 1.0), child.N_HAND, axis=1)
         return in_pairs(Hands(_positions_px(hands[:, 1:], image), scores, hands[:, 0, 0].astype(int)))
 
@@ -175,7 +170,7 @@ def attach_hands(bodies: Detections, found: Detections) -> Detections:
         The bodies with their hands, then instances of the hands without a free wrist.
     """
     hands = Hands.of(found)
-    chosen = nearest_first(bodies.keypoints_px[:, _WRISTS], hands, np.full((len(bodies), 2), -1))
+    chosen = nearest_first(bodies.keypoints_px[:, WRISTS], hands, np.full((len(bodies), 2), -1))
     rest = np.setdiff1d(np.arange(len(hands)), chosen)
     return give_hands(bodies, hands, chosen).concatenate(in_pairs(hands.take(rest)))
 

@@ -17,9 +17,8 @@ from hicp_lib.detectors.onnx.facts import Fact, facts
 from hicp_lib.detectors.onnx.session import OnnxModel, open_model
 from hicp_lib.detectors.openpose.hands import OpenPoseHands
 from hicp_lib.detectors.openpose.mobilenet import COCO_18, STRIDE, as_detections, check_height
-from hicp_lib.detectors.openpose.net_input import feed, fit
 from hicp_lib.detectors.openpose.paf import PafOptions, PartModel
-from hicp_lib.detectors.openpose.released import assemble_released
+from hicp_lib.detectors.openpose.released import assemble_released, feed, fit
 
 BODY_25 = PartModel.of("openpose_body25")
 # By the number of heat maps, background included, and of fields.
