@@ -11,6 +11,7 @@ import pytest
 
 from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.detectors.combined.detector import Combined
+from hicp_lib.detectors.onnx.box_source import BoxOptions
 from hicp_lib.detectors.registry import DETECTORS
 from hicp_lib.detectors.weights.published import published
 
@@ -37,12 +38,17 @@ def options_taken() -> dict[tuple[str, str], Parameter]:
     classes = {
         entry.name: getattr(import_module(entry.module), entry.class_name) for entry in DETECTORS.values()
     }
-    return {
+    taken = {
         (name, option): parameter
         for name, detector in (classes | {"combined": Combined}).items()
         for option, parameter in signature(detector).parameters.items()
         if not (detector is Combined and option in PARTS)
     }
+    for name, shared in [key for key, parameter in taken.items() if parameter.kind is Parameter.VAR_KEYWORD]:
+        del taken[name, shared]
+        for option in BoxOptions.__annotations__:
+            taken[name, option] = Parameter(option, Parameter.KEYWORD_ONLY, default=None)
+    return taken
 
 
 def test_the_page_names_every_option_and_no_other():

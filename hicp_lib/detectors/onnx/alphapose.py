@@ -2,18 +2,18 @@
 
 from functools import partial
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.detectors.onnx import pose_nms
-from hicp_lib.detectors.onnx.affine import Regions
-from hicp_lib.detectors.onnx.box_source import BoxSource
+from hicp_lib.detectors.onnx.box_source import BoxOptions, BoxSource
 from hicp_lib.detectors.onnx.decode import decode_combined, decode_integral, decode_quarter
-from hicp_lib.detectors.onnx.facts import TEXTS, Fact, facts
+from hicp_lib.detectors.onnx.fitting import Regions
 from hicp_lib.detectors.onnx.pose_net import Decoder, PoseNet
-from hicp_lib.detectors.onnx.session import OnnxModel, open_model
+from hicp_lib.detectors.onnx.session import TEXTS, Fact, OnnxModel, facts, open_model
 
 # Points of face and hands at the end of a set, or of the hands alone.
 _N_INTEGRAL = {"halpe136": 110, "wholebody133": 110, "halpe68_noface": 42}
@@ -32,12 +32,6 @@ class AlphaPose:
     ----------
     model : str or Path
         ONNX export.
-    person_model : str or Path, optional
-    boxes : str, optional
-        See `hicp_lib.detectors.onnx.box_source.BoxSource`.
-    person_family : str, optional
-    person_min_score, person_max_overlap : float, optional
-        See `hicp_lib.detectors.onnx.person_boxes.PersonBoxes`.
     decoding : str, optional
         "heatmap", "integral" (symmetric integral regression) or "combined" (face and hands integral); if
         None, detected from the network's output for the mean colour.
@@ -46,6 +40,8 @@ class AlphaPose:
     provider : str
     threads : int
         As for `hicp_lib.detectors.onnx.mmpose.MMPose`.
+    **person_boxes : object
+        See `hicp_lib.detectors.onnx.box_source.BoxOptions`.
     """
 
     name = "alphapose"
@@ -53,16 +49,12 @@ class AlphaPose:
     def __init__(
         self,
         model: str | Path,
-        person_model: str | Path | None = None,
-        boxes: str | None = None,
-        person_family: str | None = None,
-        person_min_score: float | None = None,
-        person_max_overlap: float | None = None,
         decoding: str | None = None,
         flip_test: bool = False,
         input_size_px: list | None = None,
         provider: str = "cpu",
         threads: int = 1,
+        **person_boxes: Unpack[BoxOptions],
     ) -> None:
         opened = open_model(model, provider, threads)
         self._net = PoseNet(opened, _MEAN, _STD, flip_test, input_size_px)
@@ -73,8 +65,7 @@ class AlphaPose:
         self.decoding = decoding or _told_decoding(self._net.answer[0], n_integral)
         self._decode = _decoder(opened, self.decoding, n_integral)
         self._rules = _rules(self._net.convention, self.decoding)
-        own = {"family": person_family, "min_score": person_min_score, "max_overlap": person_max_overlap}
-        self._boxes = BoxSource(boxes, person_model, provider, threads, **own)
+        self._boxes = BoxSource(provider, threads, **person_boxes)
         self.takes_boxes = self._boxes.kind == "gt"
         self.settings = {"model": opened.settings, "decoding": self.decoding, "flip_test": flip_test}
         self.settings |= self._boxes.settings

@@ -18,9 +18,8 @@ import numpy as np
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import refuse_unknown
 from hicp_lib.detectors.onnx.decode import decode_roi_maps, given
-from hicp_lib.detectors.onnx.facts import Fact, facts
-from hicp_lib.detectors.onnx.letterbox import Letterbox, letterbox
-from hicp_lib.detectors.onnx.session import Port, open_model
+from hicp_lib.detectors.onnx.fitting import Letterbox, letterbox
+from hicp_lib.detectors.onnx.session import Fact, Port, facts, open_model
 
 _N_KEYPOINTS = 17
 _LOGIT_MIDDLE = 2.0

@@ -1,20 +1,19 @@
 """MMPose's top-down networks on the user's own weights: boxes, then one pass and one pose per person."""
 
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import refuse_unknown
 from hicp_lib.core.keypoints import SIGMAS, TO_HALPE
-from hicp_lib.detectors.onnx.affine import Regions
-from hicp_lib.detectors.onnx.box_source import BoxSource
+from hicp_lib.detectors.onnx.box_source import BoxOptions, BoxSource
 from hicp_lib.detectors.onnx.decode import decode_dark, decode_dark_udp, decode_quarter
-from hicp_lib.detectors.onnx.facts import Fact, facts
-from hicp_lib.detectors.onnx.letterbox import IMAGENET_RGB
+from hicp_lib.detectors.onnx.fitting import IMAGENET_RGB, Regions
 from hicp_lib.detectors.onnx.pose_net import PoseNet
 from hicp_lib.detectors.onnx.pose_nms import oks_nms
-from hicp_lib.detectors.onnx.session import OnnxModel, open_model
+from hicp_lib.detectors.onnx.session import Fact, OnnxModel, facts, open_model
 
 # RTMW's head enlarges features by shuffling pixels; the other SimCC heads do not. Its scores reach about ten.
 _RTMW_OPERATOR, _RTMW_SCALE = "DepthToSpace", 10.0
@@ -32,12 +31,6 @@ class MMPose:
     ----------
     model : str or Path
         ONNX export, whole body (133 points), Halpe (26, 136), COCO (17), CrowdPose (14) or one hand (21).
-    person_model : str or Path, optional
-    boxes : str, optional
-        See `hicp_lib.detectors.onnx.box_source.BoxSource`.
-    person_family : str, optional
-    person_min_score, person_max_overlap : float, optional
-        See `hicp_lib.detectors.onnx.person_boxes.PersonBoxes`.
     dark : bool
         Decode heat maps aware of their distribution (the "dark" configurations).
     udp : bool, optional
@@ -54,6 +47,8 @@ class MMPose:
     provider : str
     threads : int
         See `hicp_lib.detectors.onnx.session.open_model`.
+    **person_boxes : object
+        See `hicp_lib.detectors.onnx.box_source.BoxOptions`.
     """
 
     name = "mmpose"
@@ -61,11 +56,6 @@ class MMPose:
     def __init__(
         self,
         model: str | Path,
-        person_model: str | Path | None = None,
-        boxes: str | None = None,
-        person_family: str | None = None,
-        person_min_score: float | None = None,
-        person_max_overlap: float | None = None,
         dark: bool = True,
         udp: bool | None = None,
         flip_test: bool = False,
@@ -74,6 +64,7 @@ class MMPose:
         input_size_px: list | None = None,
         provider: str = "cpu",
         threads: int = 1,
+        **person_boxes: Unpack[BoxOptions],
     ) -> None:
         opened, self._dark = open_model(model, provider, threads), dark
         self._net = PoseNet(opened, *IMAGENET_RGB, flip_test, input_size_px)
@@ -84,8 +75,7 @@ class MMPose:
         is_rtmw = self._net.is_simcc and _RTMW_OPERATOR in opened.told.operators
         self._score_scale = score_scale or (_RTMW_SCALE if is_rtmw else 1.0)
         self._convention = _hand_convention(self._net.convention, hand)
-        own = {"family": person_family, "min_score": person_min_score, "max_overlap": person_max_overlap}
-        self._boxes = BoxSource(boxes, person_model, provider, threads, **own)
+        self._boxes = BoxSource(provider, threads, **person_boxes)
         self.takes_boxes = self._boxes.kind == "gt"
         self._sigmas = SIGMAS["wholebody"][TO_HALPE[self._convention]]
         self.settings = {"model": opened.settings, "dark": dark, "flip_test": flip_test}

@@ -13,11 +13,10 @@ import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.onnx.decode import given
-from hicp_lib.detectors.onnx.facts import Fact, facts
-from hicp_lib.detectors.onnx.letterbox import letterbox
+from hicp_lib.detectors.onnx.fitting import letterbox
 from hicp_lib.detectors.onnx.person_boxes import DEFAULT_SIDE_PX, FILL, N_BOX, unsuppressed
 from hicp_lib.detectors.onnx.pose_net import CONVENTIONS, convention_of
-from hicp_lib.detectors.onnx.session import open_model
+from hicp_lib.detectors.onnx.session import Fact, facts, open_model
 
 _N_COLUMNS = {N_BOX + 3 * n_keypoints for n_keypoints in CONVENTIONS}
 

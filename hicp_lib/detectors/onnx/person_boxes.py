@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.errors import refuse_unknown
-from hicp_lib.detectors.onnx.facts import Fact, facts
-from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, blob, letterbox
-from hicp_lib.detectors.onnx.session import open_model
+from hicp_lib.detectors.onnx.fitting import IMAGENET_BGR, blob, letterbox
+from hicp_lib.detectors.onnx.session import Fact, facts, open_model
 
 FILL = (114, 114, 114)
 _NORMALISATIONS = {"yolox": ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), "rtmdet": IMAGENET_BGR}
@@ -75,16 +74,14 @@ class PersonBoxes:
         fitted = letterbox(image, self._size_px, FILL)
         outputs = self._model.run(blob([fitted.pixels], *_NORMALISATIONS[self._family], is_bgr=True))
         rows = self._rows(outputs)
-        suppressed = rows.shape[1] == N_BOX
-        corners, scores, labels = _listed(rows, outputs) if suppressed else self._from_grid(rows)
-        keep = (scores >= self._min_score) & np.isfinite(corners).all(axis=1)
-        keep &= (corners[:, 2:] > corners[:, :2]).all(axis=1)
-        corners, scores, labels = corners[keep] / np.tile(fitted.scale, 2), scores[keep], labels[keep]
-        if not suppressed:
-            rest = unsuppressed(corners, scores, self._max_overlap, side_px=1.0)
-            corners, scores, labels = corners[rest], scores[rest], labels[rest]
-        corners, scores = corners[labels == _PERSON], scores[labels == _PERSON]
-        return np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1), scores
+        is_suppressed = rows.shape[1] == N_BOX
+        corners, scores, labels = _listed(rows, outputs) if is_suppressed else self._from_grid(rows)
+        keep = np.flatnonzero((scores >= self._min_score) & are_boxes(corners))
+        corners = corners / np.tile(fitted.scale, 2)
+        if not is_suppressed:
+            keep = keep[unsuppressed(corners[keep], scores[keep], self._max_overlap, side_px=1.0)]
+        keep = keep[labels[keep] == _PERSON]
+        return with_sizes(corners[keep]), scores[keep]
 
     def describe(self) -> list[Fact]:
         """What is assumed about the model."""
@@ -116,6 +113,16 @@ class PersonBoxes:
         scores = rows[:, 4].astype(float) * rows[:, N_BOX:].max(axis=1)
         scores = np.where(np.isfinite(scores), scores, 0.0)
         return np.concatenate([centre - size / 2, centre + size / 2], axis=1), scores, labels
+
+
+def are_boxes(corners: np.ndarray) -> np.ndarray:
+    """Whether corners (n, 4: left, top, right, bottom) are finite and in this order, shape (n,)."""
+    return np.isfinite(corners).all(axis=1) & (corners[:, 2:] > corners[:, :2]).all(axis=1)
+
+
+def with_sizes(corners: np.ndarray) -> np.ndarray:
+    """Boxes (n, 4: x, y, width, height) from their corners (n, 4: left, top, right, bottom)."""
+    return np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1)
 
 
 def unsuppressed(

@@ -12,11 +12,9 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import mirror
-from hicp_lib.detectors.onnx.affine import PADDING, Regions
 from hicp_lib.detectors.onnx.decode import Decoded, decode_simcc
-from hicp_lib.detectors.onnx.facts import Fact, facts
-from hicp_lib.detectors.onnx.letterbox import blob
-from hicp_lib.detectors.onnx.session import OnnxModel
+from hicp_lib.detectors.onnx.fitting import PADDING, Regions, blob
+from hicp_lib.detectors.onnx.session import Fact, OnnxModel, facts
 
 CONVENTIONS = {14: "crowdpose14", 17: "coco17", 21: "right_hand21", 26: "halpe26", 68: "halpe68_noface"}
 CONVENTIONS |= {133: "wholebody133", 136: "halpe136"}

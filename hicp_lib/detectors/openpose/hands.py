@@ -13,7 +13,7 @@ import numpy as np
 from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.combined.hand_squares import HAND_POINTS, Arms, SquareRule
 from hicp_lib.detectors.onnx.session import open_model
-from hicp_lib.detectors.openpose.mobilenet import STRIDE
+from hicp_lib.detectors.openpose.paf import STRIDE
 from hicp_lib.detectors.openpose.released import enlarge, feed
 
 _HAND_SIDE_PX, _N_HAND = 368, 21

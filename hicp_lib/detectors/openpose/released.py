@@ -30,7 +30,7 @@ import cv2
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from hicp_lib.detectors.onnx.letterbox import Letterbox
+from hicp_lib.detectors.onnx.fitting import Letterbox
 from hicp_lib.detectors.openpose.paf import Limb, PafOptions, PartModel, Person, find_limbs, part_rows
 
 _MAX_PEAKS = 127

@@ -8,9 +8,8 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND, TO_HALPE
 from hicp_lib.detectors.openpose.hands import OpenPoseHands
-from hicp_lib.detectors.openpose.mobilenet import COCO_18
+from hicp_lib.detectors.openpose.networks import BODY_25, COCO_18, OpenPose
 from hicp_lib.detectors.openpose.released import fit
-from hicp_lib.detectors.openpose.user_network import BODY_25, OpenPose
 from tests.detectors.onnx.onnx_models import constant_model, save
 from tests.detectors.openpose.test_paf import STANDING, draw
 

@@ -158,10 +158,16 @@ def test_few_results_wait_in_memory_and_all_come_in_order(folder, monkeypatch):
     ]  # fmt: skip
 
 
-def test_a_kept_result_that_goes_while_it_waits_is_told(folder, tmp_path):
-    waiting = run.OrderedDict({0: run._Waiting("a.png", tmp_path, tmp_path / "gone.bin")})
-    ((_, answer),) = run._in_order(waiting)
-    assert isinstance(answer, InputError) and "gone.bin: was removed" in str(answer)
+def test_a_kept_result_that_goes_while_it_waits_is_told(folder, monkeypatch):
+    paths = sorted(folder.iterdir())
+    list(run.detect_each("counting", enumerate(paths[1:])))
+    monkeypatch.setattr(run, "_MOST_WAITING", 0)
+    known, read = run.read_result, set()
+    monkeypatch.setattr(
+        run, "read_result", lambda path: None if path in read else known(read.add(path) or path)
+    )
+    (_, answer), *_ = list(run.detect_each("counting", enumerate(paths), workers=1))[1:]
+    assert isinstance(answer, InputError) and ".bin: was removed" in str(answer)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
