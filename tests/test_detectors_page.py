@@ -6,12 +6,12 @@ import json
 import re
 from importlib import import_module
 from inspect import Parameter, signature
+from typing import get_args
 
 import pytest
 
 from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.detectors.combined.detector import Combined
-from hicp_lib.detectors.onnx.box_source import BoxOptions
 from hicp_lib.detectors.registry import DETECTORS
 from hicp_lib.detectors.weights.published import published
 
@@ -41,13 +41,15 @@ def options_taken() -> dict[tuple[str, str], Parameter]:
     taken = {
         (name, option): parameter
         for name, detector in (classes | {"combined": Combined}).items()
-        for option, parameter in signature(detector).parameters.items()
+        for option, parameter in signature(detector, eval_str=True).parameters.items()
         if not (detector is Combined and option in PARTS)
     }
-    for name, shared in [key for key, parameter in taken.items() if parameter.kind is Parameter.VAR_KEYWORD]:
+    several = {key: of for key, of in taken.items() if of.kind is Parameter.VAR_KEYWORD}
+    for (name, shared), parameter in several.items():
         del taken[name, shared]
-        for option in BoxOptions.__annotations__:
-            taken[name, option] = Parameter(option, Parameter.KEYWORD_ONLY, default=None)
+        for option in get_args(parameter.annotation)[0].__annotations__:
+            default = {"provider": "cpu", "threads": 1}.get(option)
+            taken[name, option] = Parameter(option, Parameter.KEYWORD_ONLY, default=default)
     return taken
 
 

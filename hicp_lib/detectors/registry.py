@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from importlib import import_module
+from inspect import Parameter, signature
 from typing import Any, get_args, get_type_hints
 
 from hicp_lib.core.datafiles import DATA_DIR
@@ -184,10 +185,12 @@ def _make_combined(name: str, options: dict) -> Detector:
 
 def _option_types(detector_class: type) -> dict[str, tuple[type, ...]]:
     """The types that each option may have."""
-    hints = get_type_hints(detector_class.__init__)
-    hints.pop("return")
-    if "person_boxes" in hints:  # options that several detectors share
-        hints |= get_type_hints(*get_args(hints.pop("person_boxes")))
+    hints: dict[str, Any] = {}
+    for name, parameter in signature(detector_class, eval_str=True).parameters.items():
+        is_shared = parameter.kind is Parameter.VAR_KEYWORD  # with other detectors
+        hints |= (
+            get_type_hints(*get_args(parameter.annotation)) if is_shared else {name: parameter.annotation}
+        )
     kinds = {name: get_args(kind) or (kind,) for name, kind in hints.items()}
     return {name: (*kind, int) if float in kind else kind for name, kind in kinds.items()}
 

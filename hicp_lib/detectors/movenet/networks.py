@@ -17,7 +17,7 @@ import numpy as np
 from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.onnx.box_source import BoxOptions, BoxSource
 from hicp_lib.detectors.onnx.fitting import Regions, letterbox
-from hicp_lib.detectors.onnx.session import open_committed
+from hicp_lib.detectors.onnx.session import RunOptions, open_committed
 
 
 class MoveNetThunder:
@@ -28,24 +28,15 @@ class MoveNetThunder:
     padding : float
         Factor by which boxes are enlarged before they become squares. Of 1.0, 1.1, 1.25 and 1.5, 1.0 was best
         on development identities (seed 11, 100 scenes), by .01 AP on Basic and .05 on Headless.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
     **person_boxes : object
         See `hicp_lib.detectors.onnx.box_source.BoxOptions`.
     """
 
     name = "movenet-thunder"
 
-    def __init__(
-        self,
-        padding: float = 1.0,
-        provider: str = "cpu",
-        threads: int = 1,
-        **person_boxes: Unpack[BoxOptions],
-    ) -> None:
-        self._model = open_committed(f"{self.name}.onnx", provider, threads)
-        self._boxes = BoxSource(provider, threads, **person_boxes)
+    def __init__(self, padding: float = 1.0, **person_boxes: Unpack[BoxOptions]) -> None:
+        self._boxes = BoxSource(**person_boxes)
+        self._model = open_committed(f"{self.name}.onnx", **self._boxes.run)
         self._padding = padding
         self.takes_boxes = self._boxes.kind == "gt"
         self.settings: dict[str, Any] = {"padding": padding, "model": self._model.settings}
@@ -85,15 +76,14 @@ class MoveNetMultiPose:
     ----------
     min_person_score : float
         People with a lower score are dropped; the network always gives six rows.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
+    **run : object
+        See `hicp_lib.detectors.onnx.session.RunOptions`.
     """
 
     name = "movenet-multipose"
 
-    def __init__(self, min_person_score: float = 0.1, provider: str = "cpu", threads: int = 1) -> None:
-        self._model = open_committed(f"{self.name}.onnx", provider, threads)
+    def __init__(self, min_person_score: float = 0.1, **run: Unpack[RunOptions]) -> None:
+        self._model = open_committed(f"{self.name}.onnx", **run)
         self._min_person_score = min_person_score
         self.settings = {"min_person_score": min_person_score, "opencv": cv2.__version__}
         self.settings["model"] = self._model.settings

@@ -37,9 +37,6 @@ class AlphaPose:
         None, detected from the network's output for the mean colour.
     flip_test : bool
     input_size_px : list of int, optional
-    provider : str
-    threads : int
-        As for `hicp_lib.detectors.onnx.mmpose.MMPose`.
     **person_boxes : object
         See `hicp_lib.detectors.onnx.box_source.BoxOptions`.
     """
@@ -52,11 +49,10 @@ class AlphaPose:
         decoding: str | None = None,
         flip_test: bool = False,
         input_size_px: list | None = None,
-        provider: str = "cpu",
-        threads: int = 1,
         **person_boxes: Unpack[BoxOptions],
     ) -> None:
-        opened = open_model(model, provider, threads)
+        self._boxes = BoxSource(**person_boxes)
+        opened = open_model(model, **self._boxes.run)
         self._net = PoseNet(opened, _MEAN, _STD, flip_test, input_size_px)
         if self._net.is_simcc:
             raise opened.refusal("SimCC vectors are not AlphaPose's; expected heat maps, or use mmpose")
@@ -65,7 +61,6 @@ class AlphaPose:
         self.decoding = decoding or _told_decoding(self._net.answer[0], n_integral)
         self._decode = _decoder(opened, self.decoding, n_integral)
         self._rules = _rules(self._net.convention, self.decoding)
-        self._boxes = BoxSource(provider, threads, **person_boxes)
         self.takes_boxes = self._boxes.kind == "gt"
         self.settings = {"model": opened.settings, "decoding": self.decoding, "flip_test": flip_test}
         self.settings |= self._boxes.settings

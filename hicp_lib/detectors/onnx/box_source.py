@@ -8,14 +8,14 @@ file.
 """
 
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, Unpack
 
 import numpy as np
 
 from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.detectors.onnx.fitting import IMAGENET_BGR, Regions, blob
 from hicp_lib.detectors.onnx.person_boxes import PersonBoxes, are_boxes, unsuppressed, with_sizes
-from hicp_lib.detectors.onnx.session import TEXTS, Fact, facts, open_committed
+from hicp_lib.detectors.onnx.session import TEXTS, Fact, RunOptions, facts, open_committed
 
 FILE = "nanodet.onnx"
 _STRIDES_PX = (8, 16, 32)
@@ -32,15 +32,12 @@ class NanoDet:
         intersection over union of .5) with 7 % false boxes; 0.2 finds 95 % with 22 % false boxes.
     max_overlap : float
         Of two boxes that overlap more (intersection over union), the one with the higher score is kept.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
+    **run : object
+        See `hicp_lib.detectors.onnx.session.RunOptions`.
     """
 
-    def __init__(
-        self, min_score: float = 0.3, max_overlap: float = 0.6, provider: str = "cpu", threads: int = 1
-    ) -> None:
-        self._model = open_committed(FILE, provider, threads)
+    def __init__(self, min_score: float = 0.3, max_overlap: float = 0.6, **run: Unpack[RunOptions]) -> None:
+        self._model = open_committed(FILE, **run)
         self._min_score, self._max_overlap = min_score, max_overlap
         self.settings = {"min_score": min_score, "max_overlap": max_overlap} | self._model.settings
 
@@ -79,7 +76,7 @@ class NanoDet:
 _MEANINGS: dict[str, str] = TEXTS["boxes"]
 
 
-class BoxOptions(TypedDict, total=False):
+class BoxOptions(RunOptions, total=False):
     """Options of a detector that needs boxes, by the names that users type; None is the default.
 
     Attributes
@@ -101,23 +98,30 @@ class BoxOptions(TypedDict, total=False):
     person_max_overlap: float | None
 
 
+_THRESHOLDS = ("person_family", "person_min_score", "person_max_overlap")
+
+
 class BoxSource:
     """A source of person boxes.
 
     Parameters
     ----------
-    provider : str
-    threads : int
-    boxes, person_model : str, optional
-    **thresholds : str or float or None
-        As of `BoxOptions`.
+    **options : object
+        See `BoxOptions`.
+
+    Attributes
+    ----------
+    kind : str
+        "gt", "image" or "detected".
+    run : RunOptions
+        Those of the options.
     """
 
-    def __init__(
-        self, provider: str, threads: int, boxes: str | None = None, person_model: str | Path | None = None,
-        **thresholds: Any,
-    ) -> None:  # fmt: skip
-        own = {name.removeprefix("person_"): of for name, of in thresholds.items() if of is not None}
+    def __init__(self, **options: Unpack[BoxOptions]) -> None:
+        boxes, person_model = options.get("boxes"), options.get("person_model")
+        given = {name: of for name, of in options.items() if name in _THRESHOLDS and of is not None}
+        own: dict[str, Any] = {name.removeprefix("person_"): of for name, of in given.items()}
+        self.run = RunOptions(provider=options.get("provider", "cpu"), threads=options.get("threads", 1))
         self.kind = boxes or ("detected" if person_model else "image")
         refuse_unknown("boxes", self.kind, _MEANINGS)
         if person_model is not None and self.kind != "detected":
@@ -127,13 +131,13 @@ class BoxSource:
             )
         if own and (self.kind != "detected" or person_model is None and "family" in own):
             raise InputError(
-                f"boxes {self.kind!r}: do not use person_{', person_'.join(own)}; leave them out, or give "
+                f"boxes {self.kind!r}: do not use {', '.join(given)}; leave them out, or give "
                 "boxes 'detected' and, for person_family, a person_model"
             )
         self._finder: PersonBoxes | NanoDet | None = None
         self.settings: dict[str, Any] = {"boxes": self.kind}
         if self.kind == "detected":
-            own |= {"provider": provider, "threads": threads}
+            own |= self.run
             self._finder = NanoDet(**own) if person_model is None else PersonBoxes(person_model, **own)
             self.settings["person_model"] = self._finder.settings
 

@@ -44,9 +44,6 @@ class MMPose:
         "left" or "right", the hand that a one-hand network sees.
     input_size_px : list of int, optional
         Width and height of the crops, if the file leaves them open.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
     **person_boxes : object
         See `hicp_lib.detectors.onnx.box_source.BoxOptions`.
     """
@@ -62,11 +59,10 @@ class MMPose:
         score_scale: float | None = None,
         hand: str = "right",
         input_size_px: list | None = None,
-        provider: str = "cpu",
-        threads: int = 1,
         **person_boxes: Unpack[BoxOptions],
     ) -> None:
-        opened, self._dark = open_model(model, provider, threads), dark
+        self._boxes, self._dark = BoxSource(**person_boxes), dark
+        opened = open_model(model, **self._boxes.run)
         self._net = PoseNet(opened, *IMAGENET_RGB, flip_test, input_size_px)
         self._udp, self._udp_from = _told_udp(opened, self._net.is_simcc, udp)
         if self._udp and (self._net.is_simcc or not dark):
@@ -75,7 +71,6 @@ class MMPose:
         is_rtmw = self._net.is_simcc and _RTMW_OPERATOR in opened.told.operators
         self._score_scale = score_scale or (_RTMW_SCALE if is_rtmw else 1.0)
         self._convention = _hand_convention(self._net.convention, hand)
-        self._boxes = BoxSource(provider, threads, **person_boxes)
         self.takes_boxes = self._boxes.kind == "gt"
         self._sigmas = SIGMAS["wholebody"][TO_HALPE[self._convention]]
         self.settings = {"model": opened.settings, "dark": dark, "flip_test": flip_test}

@@ -8,12 +8,13 @@ boxes with lower scores, and boxes may reach beyond the image.
 """
 
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
 from hicp_lib.core.errors import refuse_unknown
 from hicp_lib.detectors.onnx.fitting import IMAGENET_BGR, blob, letterbox
-from hicp_lib.detectors.onnx.session import Fact, facts, open_model
+from hicp_lib.detectors.onnx.session import Fact, RunOptions, facts, open_model
 
 FILL = (114, 114, 114)
 _NORMALISATIONS = {"yolox": ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), "rtmdet": IMAGENET_BGR}
@@ -35,9 +36,8 @@ class PersonBoxes:
     ----------
     model : str or Path
         ONNX export.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
+    **run : object
+        See `hicp_lib.detectors.onnx.session.RunOptions`.
     family : str, optional
         "yolox" or "rtmdet"; detected from the first convolution if None.
     min_score : float
@@ -49,13 +49,12 @@ class PersonBoxes:
     def __init__(
         self,
         model: str | Path,
-        provider: str = "cpu",
-        threads: int = 1,
         family: str | None = None,
         min_score: float = 0.3,
         max_overlap: float = 0.45,
+        **run: Unpack[RunOptions],
     ) -> None:
-        self._model = open_model(model, provider, threads)
+        self._model = open_model(model, **run)
         folds = self._model.told.first_convolution[1:2] == (_FOLDED_CHANNELS,)
         self._is_told = family is None
         self._family = family or ("yolox" if folds else "rtmdet")

@@ -10,7 +10,7 @@ import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -200,6 +200,21 @@ class OnnxModel:
         return self._responses[size_px]
 
 
+class RunOptions(TypedDict, total=False):
+    """How a network is run: options of every detector that has one.
+
+    Attributes
+    ----------
+    provider : str
+        Execution provider by its short name: cpu (the default), cuda, tensorrt, openvino, ...
+    threads : int
+        Threads of one inference, 1 by default; images already run in parallel, so more rarely help.
+    """
+
+    provider: str
+    threads: int
+
+
 _open: weakref.WeakValueDictionary[tuple, OnnxModel] = weakref.WeakValueDictionary()
 _lock = threading.Lock()
 
@@ -212,9 +227,8 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
     path : str or Path
         The file; one that keeps weights in a second file ("external data") is refused.
     provider : str
-        Execution provider by its short name: cpu, cuda, tensorrt, openvino, ...
     threads : int
-        Threads of one inference; images already run in parallel, so more rarely help.
+        See `RunOptions`.
 
     Raises
     ------

@@ -6,13 +6,14 @@ since the network is trained on right hands.
 """
 
 from pathlib import Path
+from typing import Unpack
 
 import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.combined.hand_squares import HAND_POINTS, Arms, SquareRule
-from hicp_lib.detectors.onnx.session import open_model
+from hicp_lib.detectors.onnx.session import RunOptions, open_model
 from hicp_lib.detectors.openpose.paf import STRIDE
 from hicp_lib.detectors.openpose.released import enlarge, feed
 
@@ -25,8 +26,8 @@ _MIN_AREA_PX2 = 10.0
 class OpenPoseHands:
     """OpenPose's hand network: 21 points of a right hand in a square crop."""
 
-    def __init__(self, model: str | Path, provider: str, threads: int) -> None:
-        self._model = open_model(model, provider, threads)
+    def __init__(self, model: str | Path, **run: Unpack[RunOptions]) -> None:
+        self._model = open_model(model, **run)
         height, width = self._model.image_size_px
         if height != width:
             raise self._model.refusal(f"takes images of {width} x {height}; expected squares, of hands")

@@ -12,7 +12,7 @@ limbs and people are found as in OpenPose's program.
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import cv2
 import numpy as np
@@ -20,7 +20,7 @@ import numpy as np
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.fitting import Letterbox
-from hicp_lib.detectors.onnx.session import Fact, OnnxModel, facts, open_committed, open_model
+from hicp_lib.detectors.onnx.session import Fact, OnnxModel, RunOptions, facts, open_committed, open_model
 from hicp_lib.detectors.openpose.hands import OpenPoseHands
 from hicp_lib.detectors.openpose.paf import STRIDE, PafOptions, PartModel, assemble
 from hicp_lib.detectors.openpose.released import assemble_released, feed, fit
@@ -88,16 +88,15 @@ class OpenPoseMobileNet:
     ----------
     net_height_px : int
         Height to which images are scaled, a multiple of 16; 368 as in OpenPose.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
+    **run : object
+        See `hicp_lib.detectors.onnx.session.RunOptions`.
     """
 
     name = "openpose-mobilenet"
 
-    def __init__(self, net_height_px: int = 368, provider: str = "cpu", threads: int = 1) -> None:
+    def __init__(self, net_height_px: int = 368, **run: Unpack[RunOptions]) -> None:
         check_height(net_height_px)
-        self._model = open_committed(f"{self.name}.onnx", provider, threads)
+        self._model = open_committed(f"{self.name}.onnx", **run)
         self._height_px, self._options = net_height_px, PafOptions()
         self.settings = {"net_height_px": net_height_px, **asdict(self._options)}
         self.settings |= {"model": self._model.settings, "opencv": cv2.__version__}
@@ -132,9 +131,8 @@ class OpenPose:
         ONNX conversion of the hand network; without it no hands are given.
     net_height_px : int
         Height of the input, a multiple of 16, where the file leaves it open.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
+    **run : object
+        See `hicp_lib.detectors.onnx.session.RunOptions`.
     """
 
     name = "openpose"
@@ -144,17 +142,16 @@ class OpenPose:
         model: str | Path,
         hand_model: str | Path | None = None,
         net_height_px: int = 368,
-        provider: str = "cpu",
-        threads: int = 1,
+        **run: Unpack[RunOptions],
     ) -> None:
         check_height(net_height_px)
-        self._model = open_model(model, provider, threads)
+        self._model = open_model(model, **run)
         height, width = self._model.image_size_px
         self._size_px = height or net_height_px, width
         shown_px = self._size_px[0], width or net_height_px  # fail before the first image
         answer = self._model.response_to_zeros(*shown_px)
         self._convention = _split(self._model, answer, shown_px)[2].convention
-        self._hands = OpenPoseHands(hand_model, provider, threads) if hand_model is not None else None
+        self._hands = OpenPoseHands(hand_model, **run) if hand_model is not None else None
         self._options = PafOptions()
         hands = self._hands.settings if self._hands else None
         self.settings: dict[str, Any] = {"model": self._model.settings, "hand_model": hands}

@@ -45,7 +45,7 @@ def test_thresholds():
 
 
 def test_it_is_what_detects_when_no_other_is_named():
-    source = BoxSource("cpu", 1, "detected")
+    source = BoxSource(boxes="detected")
     image, _ = render_person(0)
     np.testing.assert_array_equal(source.find(image, None)[0], NanoDet().find(image)[0])
     assert "NanoDet-g" in [fact.value for fact in source.describe()]
@@ -54,4 +54,4 @@ def test_it_is_what_detects_when_no_other_is_named():
     )
     assert finder["person_model"]["min_score"] == 0.3 and "person_model" not in whole
     with pytest.raises(InputError, match="boxes 'image': do not use a person model"):
-        BoxSource("cpu", 1, "image", "yolox.onnx")
+        BoxSource(boxes="image", person_model="yolox.onnx")

@@ -147,7 +147,7 @@ def test_hands_are_found_at_their_arms_and_on_their_side(tmp_path):
 
 
 def test_the_square_of_a_hand_follows_the_arm_and_a_part_of_an_arm_has_none(tmp_path, monkeypatch):
-    hands, asked = OpenPoseHands(hand_colours(tmp_path / "hand.onnx"), "cpu", 1), []
+    hands, asked = OpenPoseHands(hand_colours(tmp_path / "hand.onnx")), []
 
     def find(image, corner_px, side_px, is_left):
         asked.append((corner_px, side_px, is_left))
