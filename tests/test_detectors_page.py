@@ -12,12 +12,16 @@ import pytest
 
 from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.detectors.combined.detector import Combined
+from hicp_lib.detectors.mediapipe.tasks import _Task
+from hicp_lib.detectors.onnx.session import open_model
 from hicp_lib.detectors.registry import DETECTORS
 from hicp_lib.detectors.weights.published import published
 
 TEXT = (CHECKOUT / "book" / "detectors.md").read_text()
 ROW = re.compile(r"^\| `(\w+)` \| ((?:`[\w-]+`(?:, )?)+) \| ([^|]+) \| [^|]+ \|$", re.MULTILINE)
 PARTS = {"body", "hands"}  # of a combination: detectors, not options
+# Of options that several detectors declare together; the others' are None.
+SHARED_DEFAULTS = {"provider": "cpu", "threads": 1, "min_score": 0.5, "tracking_hz": 0}
 SCRIPTS = sorted((CHECKOUT / "tools").glob("export_*.py"))
 
 
@@ -48,7 +52,7 @@ def options_taken() -> dict[tuple[str, str], Parameter]:
     for (name, shared), parameter in several.items():
         del taken[name, shared]
         for option in get_args(parameter.annotation)[0].__annotations__:
-            default = {"provider": "cpu", "threads": 1}.get(option)
+            default = SHARED_DEFAULTS.get(option)
             taken[name, option] = Parameter(option, Parameter.KEYWORD_ONLY, default=default)
     return taken
 
@@ -66,6 +70,12 @@ def test_the_page_gives_the_default_of_an_option(name, option):
         assert "`" not in told  # what takes its place, in words
     else:
         assert told == f"`{default if isinstance(default, str) else json.dumps(default)}`"
+
+
+def test_shared_defaults_are_the_codes():
+    taken = [*signature(open_model).parameters.values(), *signature(_Task._prepare).parameters.values()]
+    defaults = {of.name: of.default for of in taken if of.default not in (None, Parameter.empty)}
+    assert defaults == SHARED_DEFAULTS
 
 
 @pytest.mark.parametrize("code", re.findall(r"^```python\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL))

@@ -19,6 +19,7 @@ MediaPipe's outputs and how they are converted:
 """
 
 from pathlib import Path
+from typing import TypedDict, Unpack
 
 import numpy as np
 
@@ -32,13 +33,37 @@ from hicp_lib.detectors.mediapipe.program import program_folder, program_version
 from hicp_lib.detectors.runtime.isolation import IsolatedProcess
 
 
+class TaskOptions(TypedDict, total=False):
+    """Options of each of MediaPipe's tasks.
+
+    Attributes
+    ----------
+    min_score : float
+        Threshold of MediaPipe's detector of people or palms, and of its presence check; 0.5 by default.
+    model : str or Path or None
+        An official `.task` bundle to use in place of the fetched weights.
+    tracking_hz : float
+        Rate of a video whose images come one after the other; 0, the default, for images that stand by
+        themselves.
+    """
+
+    min_score: float
+    model: str | Path | None
+    tracking_hz: float
+
+
 class _Task:
     """One of MediaPipe's tasks, in a separate process."""
 
     name: str
 
     def _prepare(
-        self, task: str, n: int, min_score: float, model: str | Path | None, tracking_hz: float
+        self,
+        task: str,
+        n: int,
+        min_score: float = 0.5,
+        model: str | Path | None = None,
+        tracking_hz: float = 0,
     ) -> None:
         """Starts at the first image, as it takes half a second; with a user's bundle at once."""
         bundle = bundles.read_bundle(task, model) if model else bundles.assemble(task)
@@ -65,24 +90,14 @@ class MediaPipePose(_Task):
     ----------
     num_poses : int
         Maximum number of people per image; 1, as in the paper, suits crops of one person.
-    min_score : float
-        Threshold of MediaPipe's person detector and of its presence check.
-    model : str or Path, optional
-        An official `.task` bundle to use in place of the fetched weights.
-    tracking_hz : float, optional
-        Rate of a video whose images come one after the other; 0 for images that stand by themselves.
+    **options : object
+        See `TaskOptions`.
     """
 
     name = "mediapipe-pose"
 
-    def __init__(
-        self,
-        num_poses: int = 1,
-        min_score: float = 0.5,
-        model: str | Path | None = None,
-        tracking_hz: float = 0,
-    ) -> None:
-        self._prepare("pose", num_poses, min_score, model, tracking_hz)
+    def __init__(self, num_poses: int = 1, **options: Unpack[TaskOptions]) -> None:
+        self._prepare("pose", num_poses, **options)
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
@@ -102,24 +117,14 @@ class MediaPipeHands(_Task):
     ----------
     num_hands : int
         Maximum number of hands per image.
-    min_score : float
-        Threshold of MediaPipe's palm detector and of its presence check.
-    model : str or Path, optional
-        An official `.task` bundle to use in place of the fetched weights.
-    tracking_hz : float, optional
-        Rate of a video whose images come one after the other; 0 for images that stand by themselves.
+    **options : object
+        See `TaskOptions`.
     """
 
     name = "mediapipe-hands"
 
-    def __init__(
-        self,
-        num_hands: int = 2,
-        min_score: float = 0.5,
-        model: str | Path | None = None,
-        tracking_hz: float = 0,
-    ) -> None:
-        self._prepare("hand", num_hands, min_score, model, tracking_hz)
+    def __init__(self, num_hands: int = 2, **options: Unpack[TaskOptions]) -> None:
+        self._prepare("hand", num_hands, **options)
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find hands in an RGB image, shape (height, width, 3), uint8, paired into instances."""
@@ -150,8 +155,8 @@ class MediaPipe:
 
     def __init__(self, num_people: int = 1, min_score: float = 0.5, tracking_hz: float = 0) -> None:
         self.parts: dict[str, MediaPipePose | MediaPipeHands] = {
-            "pose": MediaPipePose(num_people, min_score, tracking_hz=tracking_hz),
-            "hands": MediaPipeHands(2 * num_people, min_score, tracking_hz=tracking_hz),
+            "pose": MediaPipePose(num_people, min_score=min_score, tracking_hz=tracking_hz),
+            "hands": MediaPipeHands(2 * num_people, min_score=min_score, tracking_hz=tracking_hz),
         }
         self.settings = {name: part.settings for name, part in self.parts.items()}
 
