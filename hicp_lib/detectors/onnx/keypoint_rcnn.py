@@ -73,9 +73,7 @@ class KeypointRcnn:
         keep = (roles["scores"] >= self._min_score) & np.isfinite(roles["boxes"]).all(axis=1)
         people = {name: role[keep] for name, role in roles.items()}
         positions_px, scores = self._keypoints(people)
-        positions_px = positions_px / fitted.scale
-        if self._family == "detectron2":
-            positions_px = positions_px - 0.5
+        positions_px = positions_px / fitted.scale - (0.5 if self._family == "detectron2" else 0.0)
         return Detections.of_parts(*given(positions_px, scores), people["scores"], "coco17")
 
     def describe(self) -> list[Fact]:

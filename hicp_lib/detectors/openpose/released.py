@@ -120,15 +120,14 @@ def centroid_peaks(heat_map: np.ndarray, min_peak: float) -> np.ndarray:
     There are none at the border itself; one pixel inside, where enlarging produces pairs of equal values,
     equal neighbours are allowed.
     """
-    height, width = heat_map.shape
     # Pixels below their neighbours cannot be peaks: this leaves few to examine closely.
     highest = cv2.dilate(heat_map, np.ones((3, 3), np.uint8))
-    rows, columns = np.nonzero((heat_map > min_peak) & (heat_map >= highest))
+    rows, columns = cells = np.nonzero((heat_map > min_peak) & (heat_map >= highest))
     value = heat_map[rows, columns]
     around = _windows(heat_map, rows, columns, 1, min_peak).reshape(-1, 9)
     others = np.delete(around, 4, axis=1)
-    inner = (1 < columns) & (columns < width - 2) & (1 < rows) & (rows < height - 2)
-    ring = ~inner & (np.isin(columns, (1, width - 2)) | np.isin(rows, (1, height - 2)))
+    to_border = np.minimum(np.stack(cells), np.array(heat_map.shape)[:, None] - 1 - cells).T
+    inner, ring = (to_border > 1).all(axis=1), (to_border == 1).any(axis=1)
     is_peak = inner & (value[:, None] > others).all(axis=1) | ring & (value[:, None] >= others).all(axis=1)
     rows, columns, value = (part[is_peak][:_MAX_PEAKS] for part in (rows, columns, value))
     weights = np.maximum(_windows(heat_map, rows, columns, _REACH_PX, 0.0), 0).astype(float)
