@@ -16,8 +16,8 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.onnx.decode import given
 from hicp_lib.detectors.onnx.fitting import letterbox
 from hicp_lib.detectors.onnx.person_boxes import DEFAULT_SIDE_PX, FILL, N_BOX, unsuppressed
-from hicp_lib.detectors.onnx.pose_net import CONVENTIONS, convention_of
 from hicp_lib.detectors.onnx.session import Fact, RunOptions, facts, open_model
+from hicp_lib.detectors.onnx.top_down import CONVENTIONS, convention_of
 
 _N_COLUMNS = {N_BOX + 3 * n_keypoints for n_keypoints in CONVENTIONS}
 
