@@ -54,7 +54,7 @@ class AlphaPose(TopDown):
         self._rules = _rules(self.convention, self.decoding)
         self.settings["decoding"] = self.decoding
 
-    def decode_maps(self, maps: np.ndarray) -> Decoded:
+    def _decode_maps(self, maps: np.ndarray) -> Decoded:
         """As of `TopDown`."""
         if self.decoding == "combined":
             return decode_combined(maps, self._n_integral)
@@ -64,7 +64,7 @@ class AlphaPose(TopDown):
             else decode_quarter(maps, needs_both_axes=True)
         )
 
-    def people(
+    def _people(
         self, found: Decoded, box_scores: np.ndarray, boxes: np.ndarray, regions: Regions
     ) -> Detections:
         """As of `TopDown`: poses merged."""

@@ -63,11 +63,11 @@ class MMPose(TopDown):
         self.settings |= {"score_scale": self._score_scale, "convention": self.convention}
         self.settings |= {"udp": self.udp, "dark": dark, "input_size_px": self.input_size_px}
 
-    def decode_maps(self, maps: np.ndarray) -> Decoded:
+    def _decode_maps(self, maps: np.ndarray) -> Decoded:
         """As of `TopDown`."""
         return (decode_dark_udp if self.udp else decode_dark if self._dark else decode_quarter)(maps)
 
-    def people(
+    def _people(
         self, found: Decoded, box_scores: np.ndarray, boxes: np.ndarray, regions: Regions
     ) -> Detections:
         """As of `TopDown`: of two poses of one person, the better."""

@@ -36,14 +36,14 @@ class PersonBoxes:
     ----------
     model : str or Path
         ONNX export.
-    **run : object
-        See `hicp_lib.detectors.onnx.session.RunOptions`.
     family : str, optional
         "yolox" or "rtmdet"; detected from the first convolution if None.
     min_score : float
         Minimum score of a box.
     max_overlap : float
         Maximum intersection over union of two boxes, if the export does no suppression itself.
+    **run : object
+        See `hicp_lib.detectors.onnx.session.RunOptions`.
     """
 
     def __init__(

@@ -107,11 +107,11 @@ class TopDown:
             raise opened.refusal(f"its metadata say {ratio} bins per pixel of its {size}", answer)
         self.settings = {"model": opened.settings, "flip_test": flip_test} | self._boxes.settings
 
-    def decode_maps(self, maps: np.ndarray) -> Decoded:
+    def _decode_maps(self, maps: np.ndarray) -> Decoded:
         """Heat maps, shape (n, k, h, w), to positions in cells, shape (n, k, 2), and scores, shape (n, k)."""
         raise NotImplementedError
 
-    def people(
+    def _people(
         self, found: Decoded, box_scores: np.ndarray, boxes: np.ndarray, regions: Regions
     ) -> Detections:
         """The people that remain of n poses.
@@ -137,8 +137,8 @@ class TopDown:
             return Detections.none()
         regions = Regions.around(boxes, self.input_size_px, udp=self.udp)
         outputs = self._respond(regions.crop(image, self.input_size_px))
-        cells, scores = decode_simcc(*outputs) if self.is_simcc else self.decode_maps(outputs[0])
-        return self.people((regions.to_image_px(cells, self.grid_size), scores), box_scores, boxes, regions)
+        cells, scores = decode_simcc(*outputs) if self.is_simcc else self._decode_maps(outputs[0])
+        return self._people((regions.to_image_px(cells, self.grid_size), scores), box_scores, boxes, regions)
 
     def described(self, own: list[Fact]) -> list[Fact]:
         """What the file tells and how crops are made, what a subclass assumes, and where boxes come from."""
