@@ -163,7 +163,7 @@ def test_what_workers_cannot_do_and_that_they_are_gone_is_said_in_one_line(slow,
         line = refusal(address, registered, "known here only")
         assert line.startswith("worker tcp://") and "detector 'known here only' is not known" in line
         # Weights are read before images.
-        assert "no option 'delay'" in refusal(address, {1: broken}, delay=1)
+        assert "option 'delay' is not known" in refusal(address, {1: broken}, delay=1)
 
         some = {name: registered[name] for name in sorted(registered)[:4]}
         assert refusal(address, some | {"x": broken}).startswith(f"{broken}: is not an image")
