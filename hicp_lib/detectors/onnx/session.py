@@ -191,8 +191,9 @@ class OnnxModel:
             Height and width, where the model leaves them open.
         """
         if size_px not in self._responses:
-            shape = zip(self.inputs[0].shape, (1, 3, *size_px), strict=True)
-            sizes = [size or given for size, given in shape]
+            shape, one_image = self.inputs[0].shape, (1, 3, *size_px)
+            sizes = one_image if len(shape) == len(one_image) else [1] * len(shape)
+            sizes = [size or given for size, given in zip(shape, sizes, strict=True)]
             if math.prod(sizes) > raised(MAX_PIXELS):
                 raise self.refusal(f"its input would be {_text(sizes)}, more than {MAX_PIXELS:.0e} values")
             self._responses[size_px] = self.run(np.zeros(sizes, np.float32))
