@@ -29,19 +29,9 @@ from hicp_lib.core.executor import Workers, resolved, run_jobs, threads_beside
 from hicp_lib.core.files import read_bytes, sha256_bytes
 from hicp_lib.core.images import decode_image, note_rotation
 from hicp_lib.detectors.registry import make_detector
+from hicp_lib.detectors.runtime import results
 from hicp_lib.detectors.runtime.isolation import IsolationError
-from hicp_lib.detectors.runtime.results import (
-    Key,
-    Runner,
-    Timed,
-    cache_folder,
-    detections_of,
-    identity,
-    pixels_sha256,
-    read_result,
-    result_path,
-    write_result,
-)
+from hicp_lib.detectors.runtime.results import Key, Runner, Timed
 from hicp_lib.formats.annotations import Annotations, read_annotations, rows_by_image
 
 Image = str | Path | np.ndarray  # a file, or RGB, shape (height, width, 3), uint8
@@ -62,7 +52,7 @@ def detect_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, D
     -------
     dict of int to Detections
     """
-    return detections_of(time_dataset(name, dataset_dir, **options))
+    return results.detections_of(time_dataset(name, dataset_dir, **options))
 
 
 def time_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Timed]:
@@ -145,14 +135,14 @@ def detect_images(
     InputError
         If an image cannot be read, or the detector cannot be made.
     """
-    results = {}
+    by_key = {}
     each = detect_each(name, paths.items(), workers, progress, boxes_px, len(paths), **options)
     with closing(each):
         for key, found in each:
             if isinstance(found, InputError):
                 raise found
-            results[key] = found
-    return results
+            by_key[key] = found
+    return by_key
 
 
 @dataclass(eq=False)
@@ -203,7 +193,7 @@ def detect_each(
     asked = name, options, n_here
     detector = _runner(*asked).detector  # also used if the caller does the work
     boxes_px = boxes_px if getattr(detector, "takes_boxes", False) else None
-    folder, waiting = cache_folder(detector), deque[_Waiting]()
+    folder, waiting = results.cache_folder(detector), deque[_Waiting]()
 
     def jobs() -> Iterator[tuple[_Waiting, Callable[[], Timed | str] | None]]:
         for key, image in images:
@@ -218,8 +208,8 @@ def detect_each(
             if flagged is not None and isinstance(content, bytes):
                 note_rotation(content, one.name, flagged)
             boxes = None if boxes_px is None else boxes_px[key]
-            one.kept = result_path(folder, sha256, boxes)
-            result = read_result(one.kept)
+            one.kept = results.result_path(folder, sha256, boxes)
+            result = results.read_result(one.kept)
             one.found = one.kept if result and len(waiting) > _MOST_WAITING else result
             # A combination's parts are cached only for images processed on this machine.
             part_key = sha256 if n_here else None
@@ -231,7 +221,7 @@ def detect_each(
         with tqdm(desc=name, total=n_images, disable=None if progress else True) as bar:
             for one, found in run_jobs(jobs(), n_here or workers, "threads", alike=alike, named=named):
                 if isinstance(found, Timed):
-                    write_result(one.kept, found)
+                    results.write_result(one.kept, found)
                     one.found = one.kept if len(waiting) > _MOST_WAITING else found
                 elif found is not None:
                     one.found = InputError(found)
@@ -244,13 +234,13 @@ def detect_each(
 
 def _read_again(kept: Path) -> Timed | InputError:
     gone = InputError(f"{kept}: was removed while it was needed; run the same command again")
-    return read_result(kept) or gone
+    return results.read_result(kept) or gone
 
 
 def _content(image: Image) -> tuple[bytes | np.ndarray, str]:
     """The content of an image for a job, and its hash."""
     if isinstance(image, np.ndarray):
-        return image, pixels_sha256(image)
+        return image, results.pixels_sha256(image)
     content = read_bytes(image, "expected an image file")
     return content, sha256_bytes(content)
 
@@ -267,7 +257,7 @@ def _runner(name: str, options: dict, workers: int | None) -> Runner:
 
 
 def _identity(asked: tuple) -> dict:
-    return identity(_runner(*asked).detector)
+    return results.identity(_runner(*asked).detector)
 
 
 def _detect(
