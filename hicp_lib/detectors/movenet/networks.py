@@ -19,6 +19,8 @@ from hicp_lib.detectors.onnx.box_source import BoxOptions, BoxSource
 from hicp_lib.detectors.onnx.fitting import Regions, letterbox
 from hicp_lib.detectors.onnx.session import RunOptions, open_committed
 
+_FILL = (0, 0, 0)
+
 
 class MoveNetThunder:
     """MoveNet Thunder: 17 body points of one person per box.
@@ -64,9 +66,6 @@ class MoveNetLightning(MoveNetThunder):
     """MoveNet Lightning: smaller than Thunder, with the backbone of MoveNet MultiPose."""
 
     name = "movenet-lightning"
-
-
-_FILL = (0, 0, 0)
 
 
 class MoveNetMultiPose:

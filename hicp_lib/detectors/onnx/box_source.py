@@ -20,6 +20,8 @@ from hicp_lib.detectors.onnx.session import TEXTS, Fact, RunOptions, facts, open
 FILE = "nanodet.onnx"
 _STRIDES_PX = (8, 16, 32)
 _PERSON, _N_BINS = 0, 11
+_MEANINGS: dict[str, str] = TEXTS["boxes"]
+_THRESHOLDS = ("person_family", "person_min_score", "person_max_overlap")
 
 
 class NanoDet:
@@ -73,9 +75,6 @@ class NanoDet:
         return np.concatenate(corners), np.concatenate(scores)
 
 
-_MEANINGS: dict[str, str] = TEXTS["boxes"]
-
-
 class BoxOptions(RunOptions, total=False):
     """Options of a detector that needs boxes, by the names that users type; None is the default.
 
@@ -96,9 +95,6 @@ class BoxOptions(RunOptions, total=False):
     person_family: str | None
     person_min_score: float | None
     person_max_overlap: float | None
-
-
-_THRESHOLDS = ("person_family", "person_min_score", "person_max_overlap")
 
 
 class BoxSource:

@@ -17,6 +17,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+PADDING = 1.25
+"""Factor by which people's boxes are enlarged, unless said otherwise."""
 IMAGENET_RGB = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)
 """Mean and deviation of ImageNet's red, green and blue, 0-255."""
 IMAGENET_BGR = IMAGENET_RGB[0][::-1], IMAGENET_RGB[1][::-1]
@@ -100,9 +102,6 @@ def blob(
     """
     params = cv2.dnn.Image2BlobParams([*(1 / spread for spread in std), 1], mean=mean, swapRB=is_bgr)
     return cv2.dnn.blobFromImagesWithParams(images, params)
-
-
-PADDING = 1.25
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,9 @@ from hicp_lib.detectors.openpose.paf import STRIDE, PafOptions, PartModel, assem
 from hicp_lib.detectors.openpose.released import assemble_released, feed, fit
 
 COCO_18 = PartModel.of("openpose_coco18")
+BODY_25 = PartModel.of("openpose_body25")
+# By the number of heat maps, background included, and of fields.
+_PART_MODELS = {(19, 38): COCO_18, (26, 52): BODY_25}
 
 
 def check_height(net_height_px: int) -> None:
@@ -113,11 +116,6 @@ class OpenPoseMobileNet:
         maps = self.maps(net_input)
         parts, person_scores = assemble(maps[:18], maps[19:], COCO_18, STRIDE, self._options)
         return as_detections(parts, person_scores, net_input, COCO_18.convention)
-
-
-BODY_25 = PartModel.of("openpose_body25")
-# By the number of heat maps, background included, and of fields.
-_PART_MODELS = {(19, 38): COCO_18, (26, 52): BODY_25}
 
 
 class OpenPose:
