@@ -44,7 +44,7 @@ class OneStage:
     ) -> None:
         self._model = open_model(model, **run)
         self._min_score, self._max_overlap = min_score, max_overlap
-        height, width = self._model.image_size_px
+        width, height = self._model.size_px
         match self._model.told.metadata.get("imgsz"):  # Ultralytics' name of the exported task
             case [int(open_height), int(open_width)]:
                 self._size_px = width or open_width, height or open_height

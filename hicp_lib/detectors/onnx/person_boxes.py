@@ -60,7 +60,7 @@ class PersonBoxes:
         self._family = family or ("yolox" if folds else "rtmdet")
         refuse_unknown("person_family", self._family, _NORMALISATIONS)
         self._min_score, self._max_overlap = min_score, max_overlap
-        height, width = self._model.image_size_px
+        width, height = self._model.size_px
         self._size_px = width or DEFAULT_SIDE_PX, height or DEFAULT_SIDE_PX
         self._cells = _cells(self._size_px)
         rows = self._rows(self._model.response_to_zeros(*self._size_px[::-1]))

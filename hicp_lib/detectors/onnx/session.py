@@ -115,8 +115,8 @@ class OnnxModel:
         return {"sha256": self.sha256, "provider": self.provider, "onnxruntime": VERSION}
 
     @property
-    def image_size_px(self) -> tuple[int | None, int | None]:
-        """Height and width of its single input image; None where the model leaves them open.
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of its single input image; 0 where the model leaves them open.
 
         Raises
         ------
@@ -126,13 +126,7 @@ class OnnxModel:
         shape = self.inputs[0].shape
         if len(shape) != 4 or shape[0] not in (None, 1) or shape[1] not in (None, 3):
             raise self.refusal("expected an input of one image, (1, 3, h, w)")
-        return shape[2], shape[3]
-
-    @property
-    def size_px(self) -> tuple[int, int]:
-        """Width and height of its single input image; 0 where the model leaves them open."""
-        height, width = self.image_size_px
-        return width or 0, height or 0
+        return shape[3] or 0, shape[2] or 0
 
     def refusal(self, why: str, outputs: list[np.ndarray] | None = None) -> InputError:
         """The error for an unsupported network: what it is, why it is refused, what is supported.

@@ -28,7 +28,7 @@ class OpenPoseHands:
 
     def __init__(self, model: str | Path, **run: Unpack[RunOptions]) -> None:
         self._model = open_model(model, **run)
-        height, width = self._model.image_size_px
+        width, height = self._model.size_px
         if height != width:
             raise self._model.refusal(f"takes images of {width} x {height}; expected squares, of hands")
         self._side_px = height or _HAND_SIDE_PX

@@ -144,8 +144,8 @@ class OpenPose:
     ) -> None:
         check_height(net_height_px)
         self._model = open_model(model, **run)
-        height, width = self._model.image_size_px
-        self._size_px = height or net_height_px, width
+        width, height = self._model.size_px
+        self._size_px = height or net_height_px, width or None
         shown_px = self._size_px[0], width or net_height_px  # fail before the first image
         answer = self._model.response_to_zeros(*shown_px)
         self._convention = _split(self._model, answer, shown_px)[2].convention
