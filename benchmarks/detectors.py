@@ -65,8 +65,8 @@ def bare_call(name: str) -> Callable[[np.ndarray], object]:
     if isinstance(detector, openpose_net.OpenPoseMobileNet):
         return lambda image: detector.maps(openpose_net.scaled(image, 368))
     if name in SQUARE_NETS:
-        model, side_px = detector._model, detector._side_px
-        return lambda image: model.run(cv2.dnn.blobFromImage(cv2.resize(image, (side_px, side_px))))
+        model, size_px = detector._model, detector._model.size_px
+        return lambda image: model.run(cv2.dnn.blobFromImage(cv2.resize(image, size_px)))
     return detector._process.ask
 
 
