@@ -32,7 +32,7 @@ from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.images import read_image, write_png
 from hicp_lib.detectors import registry
 from hicp_lib.detectors.mediapipe import bundles, child
-from hicp_lib.detectors.openpose import mobilenet as openpose_net
+from hicp_lib.detectors.openpose import networks as openpose_net
 from hicp_lib.detectors.runtime import isolation as native
 from hicp_lib.detectors.runtime import run
 from hicp_lib.detectors.weights import default as default_weights
@@ -63,10 +63,10 @@ def bare_call(name: str) -> Callable[[np.ndarray], object]:
     """The model without what this package makes of its output: a function of an RGB image."""
     detector = registry.make_detector(name)
     if isinstance(detector, openpose_net.OpenPoseMobileNet):
-        return lambda image: detector.maps(openpose_net.fit(image, 368))
+        return lambda image: detector.maps(openpose_net.scaled(image, 368))
     if name in SQUARE_NETS:
-        model, side_px = detector._model, detector._side_px
-        return lambda image: model.run(cv2.dnn.blobFromImage(cv2.resize(image, (side_px, side_px))))
+        model, size_px = detector._model, detector._model.size_px
+        return lambda image: model.run(cv2.dnn.blobFromImage(cv2.resize(image, size_px)))
     return detector._process.ask
 
 

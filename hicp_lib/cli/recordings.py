@@ -93,7 +93,8 @@ def import_(
 
     Without --poses, --base-frame or --joint-states the camera's own frame is the base frame.
     """
-    from hicp_lib.recordings.importing import import_open3d, read_pose_source
+    from hicp_lib.recordings.importing import import_open3d
+    from hicp_lib.recordings.trajectories import read_pose_source
 
     if (bag is None) == (folder is None):
         raise click.UsageError("Give either --bag FILE or --open3d DIR.", click.get_current_context())
@@ -128,8 +129,8 @@ def _tell(out: Path, n_frames: int, notes: list[str]) -> None:
 @pose_options
 def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> None:
     """Record from a RealSense into the folder OUT, until Ctrl-C; the raw streams stay in OUT.db3."""
-    from hicp_lib.recordings.importing import read_pose_source
     from hicp_lib.recordings.realsense import record_camera
+    from hicp_lib.recordings.trajectories import read_pose_source
 
     if joints and poses:
         raise click.UsageError("Give either --poses FILE or --joints FILE.", click.get_current_context())

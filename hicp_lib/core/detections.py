@@ -84,7 +84,7 @@ class Detector(Protocol):
 
     A detector with a true attribute `takes_boxes` gets the people's boxes, `detect(image, boxes_px)`. A
     detector composed of others has them in a dictionary `parts` and calls them there, so that their results
-    can be cached (see `hicp_lib.detectors.runtime.cached_parts`). A detector whose first call has to start
+    can be cached (see `hicp_lib.detectors.runtime.results`). A detector whose first call has to start
     something may offer a method `start()`, which does so in advance.
 
     Attributes

@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 from importlib import import_module
-from inspect import signature
-from typing import Any, get_args
+from inspect import Parameter, signature
+from typing import Any, get_args, get_type_hints
 
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.detections import Detector
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import read_json
 from hicp_lib.detectors.weights.user import user_options
 
@@ -76,8 +76,7 @@ _CLASSES = {
     "hicp_lib.detectors.mediapipe.tasks": "MediaPipePose MediaPipeHands MediaPipe",
     "hicp_lib.detectors.movenet.networks": "MoveNetThunder MoveNetLightning MoveNetMultiPose",
     "hicp_lib.detectors.posenet.detector": "PoseNetMobileNet",
-    "hicp_lib.detectors.openpose.mobilenet": "OpenPoseMobileNet",
-    "hicp_lib.detectors.openpose.user_network": "OpenPose",
+    "hicp_lib.detectors.openpose.networks": "OpenPoseMobileNet OpenPose",
     "hicp_lib.detectors.onnx.mmpose": "MMPose",
     "hicp_lib.detectors.onnx.alphapose": "AlphaPose",
     "hicp_lib.detectors.onnx.keypoint_rcnn": "KeypointRcnn",
@@ -148,22 +147,17 @@ def make_detector(name: str, **options) -> Detector:
     >>> make_detector("openpose-mobilenet", height=300)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
-    hicp_lib.core.errors.InputError: detector 'openpose-mobilenet' has no option 'height'; expected ...
+    hicp_lib.core.errors.InputError: detector 'openpose-mobilenet': option 'height' is not known; expected ...
     """
     if name.startswith(COMBINED):
         return _make_combined(name, options)
-    if name not in DETECTORS:
-        raise InputError(
-            f"detector {name!r} is not known; expected one of: {', '.join(DETECTORS)}, {COMBINED}BODY+HANDS"
-        )
+    refuse_unknown("detector", name, [*DETECTORS, f"{COMBINED}BODY+HANDS"])
     entry = DETECTORS[name]
     if entry.needs_model and not options.get("model"):
         options = user_options(name) | options
-    if entry.needs_model and not options.get("model"):
-        raise InputError(
-            f"detector {name!r} needs a weight file of your own; name it once with: {command_to_use(name)}; "
-            f"or give it with: {command_to_run(name)}"
-        )
+        if not options.get("model"):
+            how = f"name it once with: {command_to_use(name)}; or give it with: {command_to_run(name)}"
+            raise InputError(f"detector {name!r} needs a weight file of your own; {how}")
     detector_class = getattr(import_module(entry.module), entry.class_name)
     _check_options(name, detector_class, options)
     return detector_class(**options)
@@ -185,33 +179,36 @@ def _make_combined(name: str, options: dict) -> Detector:
     for_hands = _HANDS_WITHIN.get(hands, {}) | {
         key.removeprefix("hands_"): value for key, value in options.items() if key.startswith("hands_")
     }
+    if for_hands.get("tracking_hz"):
+        wrong = "hands are searched for in parts of an image one after the other, which are no video"
+        raise InputError(f"detector {name!r}: {wrong}; leave out hands_tracking_hz")
     for_body = {key: options[key] for key in options if key not in own and not key.startswith("hands_")}
     return combined_class(make_detector(body, **for_body), make_detector(hands, **for_hands), **own)
 
 
-def _option_types(detector_class: type) -> dict[str, Any]:
-    parameters = signature(detector_class, eval_str=True).parameters
-    return {name: parameter.annotation for name, parameter in parameters.items()}
+def _option_types(detector_class: type) -> dict[str, tuple[type, ...]]:
+    """The types that each option may have."""
+    hints: dict[str, Any] = {}
+    for name, parameter in signature(detector_class, eval_str=True).parameters.items():
+        is_shared = parameter.kind is Parameter.VAR_KEYWORD  # with other detectors
+        hints |= (
+            get_type_hints(*get_args(parameter.annotation)) if is_shared else {name: parameter.annotation}
+        )
+    kinds = {name: get_args(kind) or (kind,) for name, kind in hints.items()}
+    return {name: (*kind, int) if float in kind else kind for name, kind in kinds.items()}
 
 
-def _check_options(name: str, detector_class: type, options: dict) -> None:
+def _check_options(name: str, detector_class: type, options: dict[str, Any]) -> None:
     kinds = _option_types(detector_class)
     for option, value in options.items():
-        if option not in kinds:
-            raise InputError(
-                f"detector {name!r} has no option {option!r}; expected one of: {', '.join(kinds)}"
-            )
-        kind = kinds[option] | int if float in (kinds[option], *get_args(kinds[option])) else kinds[option]
-        takes_bool = bool in (kinds[option], *get_args(kinds[option]))
-        if not isinstance(value, kind) or (isinstance(value, bool) and not takes_bool):
-            wanted = getattr(kinds[option], "__name__", None) or str(kinds[option])
-            raise InputError(f"detector {name!r}: option {option!r} is {value!r}; expected {wanted}")
+        refuse_unknown(f"detector {name!r}: option", option, kinds)
+        wrong = f"detector {name!r}: option {option!r} is {value!r}"
+        if not isinstance(value, kinds[option]) or (isinstance(value, bool) and bool not in kinds[option]):
+            raise InputError(f"{wrong}; expected {' or '.join(kind.__name__ for kind in kinds[option])}")
         least, most = next(of for end, of in _BOUNDS.items() if option.endswith(end))
-        numbers = value if isinstance(value, list) else [value]
+        numbers: list[Any] = value if isinstance(value, list) else [value]
         if not all(least <= one <= most for one in numbers if type(one) in (int, float)):  # NaN is outside
-            raise InputError(
-                f"detector {name!r}: option {option!r} is {value!r}; expected {least:g} to {most:g}"
-            )
+            raise InputError(f"{wrong}; expected {least:g} to {most:g}")
 
 
 def describe(detector: Detector) -> list[tuple[str, str, str]]:

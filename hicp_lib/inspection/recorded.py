@@ -17,10 +17,10 @@ from hicp_lib.recordings.bag_file import open_bag
 from hicp_lib.recordings.bag_streams import find_streams
 from hicp_lib.recordings.camera_file import read_distorted_camera
 from hicp_lib.recordings.check import FURTHEST_POSE_M, check_recording
-from hicp_lib.recordings.importing import METADATA, read_pose_source
+from hicp_lib.recordings.importing import METADATA
 from hicp_lib.recordings.qualisys import read_mocap
 from hicp_lib.recordings.recording import open_recording, read_csv
-from hicp_lib.recordings.trajectories import read_trajectory
+from hicp_lib.recordings.trajectories import read_pose_source, read_trajectory
 from hicp_lib.recordings.tum import read_file_list, remarks
 
 _OPTIONS = {"fps": "--rate", "depth_scale": "--depth-scale"}

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 # The longer ones are beginnings of unit names: old files truncate them to four letters.
 _UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 _UNITS_M |= {"mill": 1e-3, "cent": 1e-2, "met": 1.0, "inch": 0.0254, "feet": 0.3048, "foot": 0.3048}
-_MAX_RATE_HZ = 1e5
+MAX_RATE_HZ = 1e5
 _SAME_SHARE = 0.005  # tolerance between the two values of a rate or scale
 _PARAMETERS = ("RATE", "SCALE", "FRAMES", "DATA_START")
 _BLOCK_BYTES = 512
@@ -114,7 +114,7 @@ def _checked(path: str, points: np.ndarray, residuals: np.ndarray, said: Said) -
     names = _distinct([*names, *[""] * points.shape[1]][: points.shape[1]])
     if not labels or len(set(names)) != max(len(names), 1):
         raise InputError(f"{path}: POINT:LABELS does not name the markers; name them in Qualisys")
-    if not len(rate) or not 0 < rate[0] <= _MAX_RATE_HZ:
+    if not len(rate) or not 0 < rate[0] <= MAX_RATE_HZ:
         raise InputError(f"{path}: POINT:RATE is missing or wrong; expected frames per second")
     found = {_unit_m(str(unit)) for unit in said.get("UNITS", np.zeros(0)) if str(unit).strip()}
     if len(found) != 1 or None in found:

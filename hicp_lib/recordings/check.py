@@ -8,20 +8,9 @@ from typing import Any
 import numpy as np
 
 from hicp_lib.core.errors import InputError
+from hicp_lib.recordings import recording as rec
 from hicp_lib.recordings.camera_file import read_camera
-from hicp_lib.recordings.recording import (
-    CAMERA_FILE,
-    DEPTH_LIST,
-    POSES_FILE,
-    RGB_LIST,
-    Recording,
-    associate_frames,
-    open_recording,
-    read_depth_m,
-    read_joints,
-    read_rgb,
-    read_truth,
-)
+from hicp_lib.recordings.recording import Recording
 from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, associate, read_file_list, read_poses, remarks
 
 PLAUSIBLE_DEPTH_M = (0.1, 12.0)  # of the median depth that a camera near a robot sees
@@ -74,8 +63,8 @@ def check_recording(folder: str | Path) -> list[Finding]:
         return [Finding(f"{folder}: is not a folder; give the folder of a recording")]
     _check_files(findings, folder)
     if not any(finding.is_fatal for finding in findings):
-        recording = open_recording(folder)
-        for read in (read_truth, read_joints):
+        recording = rec.open_recording(folder)
+        for read in (rec.read_truth, rec.read_joints):
             findings.attempt(read, recording)
         for check in (_check_images, _check_poses, _check_mocap):
             check(findings, recording)
@@ -97,15 +86,15 @@ class _Findings(list[Finding]):
 
 def _check_files(findings: _Findings, folder: Path) -> None:
     """Missing or malformed text files, missing images, unpaired images."""
-    findings.attempt(read_camera, folder / CAMERA_FILE)
-    lists = [findings.attempt(read_file_list, folder / name) for name in (RGB_LIST, DEPTH_LIST)]
+    findings.attempt(read_camera, folder / rec.CAMERA_FILE)
+    lists = [findings.attempt(read_file_list, folder / name) for name in (rec.RGB_LIST, rec.DEPTH_LIST)]
     for _, names in filter(None, lists):
         missing = [name for name in names if not (folder / name).is_file()]
         if missing:
             text = f"is not there; {len(missing)} of {len(names)} listed are not"
             findings.note(folder / missing[0], text, is_fatal=True)
-    poses = findings.attempt(read_poses, folder / POSES_FILE)
-    for name, read in zip((RGB_LIST, DEPTH_LIST, POSES_FILE), (*lists, poses), strict=True):
+    poses = findings.attempt(read_poses, folder / rec.POSES_FILE)
+    for name, read in zip((rec.RGB_LIST, rec.DEPTH_LIST, rec.POSES_FILE), (*lists, poses), strict=True):
         for text in remarks(folder / name, read[0]) if read else ():
             findings.note(folder / name, text)
     if poses and all(lists):
@@ -114,18 +103,18 @@ def _check_files(findings: _Findings, folder: Path) -> None:
 
 def _check_association(findings: _Findings, folder: Path, times_s: Sequence[np.ndarray]) -> None:
     rgb_s, depth_s, pose_s = times_s
-    is_fatal = len(associate_frames(rgb_s, depth_s, pose_s)[0]) == 0
+    is_fatal = len(rec.associate_frames(rgb_s, depth_s, pose_s)[0]) == 0
     for name, other_s in (("depth image", depth_s), ("pose", pose_s)):
         n = len(rgb_s) - len(associate(rgb_s, other_s)[0])
         if n:
             text = f"{n} of {len(rgb_s)} colour images have no {name} within {MAX_DIFFERENCE_S:g} s"
-            findings.note(folder / RGB_LIST, f"{text} and are left out", is_fatal)
+            findings.note(folder / rec.RGB_LIST, f"{text} and are left out", is_fatal)
 
 
 def _check_images(findings: _Findings, recording: Recording) -> None:
     """Images that cannot be read, are not of the right kind, or have another size; implausible depth."""
     middles_m = []
-    for kind, read in (("colour", read_rgb), ("depth", read_depth_m)):
+    for kind, read in (("colour", rec.read_rgb), ("depth", rec.read_depth_m)):
         bad = _Findings()
         for k in range(len(recording)):
             image = bad.attempt(read, recording, k)
@@ -136,19 +125,19 @@ def _check_images(findings: _Findings, recording: Recording) -> None:
     n, n_empty = len(middles_m), int(np.isnan(middles_m).sum())
     if n_empty:
         text = f"{n_empty} of {n} depth images hold no depth at all"
-        findings.note(recording.folder / DEPTH_LIST, text, is_fatal=n_empty == n)
+        findings.note(recording.folder / rec.DEPTH_LIST, text, is_fatal=n_empty == n)
     low, high = PLAUSIBLE_DEPTH_M
     if n_empty < n and not low <= (middle := np.nanmedian(middles_m)) <= high:
         scale = f"with depth_scale {recording.depth_units_per_m:g} the middle depth is {middle:.3g} m"
         text = f"{scale}; expected {low:g} to {high:g} m, correct the scale"
-        findings.note(recording.folder / CAMERA_FILE, text)
+        findings.note(recording.folder / rec.CAMERA_FILE, text)
 
 
 def _check_poses(findings: _Findings, recording: Recording) -> None:
     furthest_m = np.linalg.norm(recording.T_base_cam[:, :3, 3], axis=1).max()
     if furthest_m > FURTHEST_POSE_M:
         text = f"the camera is up to {furthest_m:.4g} m from the base; expected metres, not millimetres"
-        findings.note(recording.folder / POSES_FILE, text)
+        findings.note(recording.folder / rec.POSES_FILE, text)
 
 
 def _check_mocap(findings: _Findings, recording: Recording) -> None:

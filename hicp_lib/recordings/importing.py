@@ -1,8 +1,4 @@
-"""Recordings of other tools: Open3D's folder layout, and sources of camera poses.
-
-Images are copied as they are, unless they are distorted. Poses come from the user: a text file in the
-TUM layout, where a single line means a camera that does not move, or a CSV of the robot's joint angles.
-"""
+"""Recordings in Open3D's folder layout; images are copied as they are, unless they are distorted."""
 
 import re
 from pathlib import Path
@@ -17,61 +13,13 @@ from hicp_lib.core.folders import listed, refuse_used_folder
 from hicp_lib.core.images import decode
 from hicp_lib.formats.json_validation import is_number, shown
 from hicp_lib.recordings.camera_file import read_distorted_camera
-from hicp_lib.recordings.recording import check_size, read_csv
+from hicp_lib.recordings.recording import check_size
 from hicp_lib.recordings.rectification import rectify
-from hicp_lib.recordings.trajectories import read_trajectory
-from hicp_lib.recordings.tum import names_poses
 from hicp_lib.recordings.writer import JPEG_QUALITY, Poses, write_index
 
 METADATA = ("intrinsic.json", "camera_intrinsic.json")
 _IMAGE_KINDS = (".png", ".jpg", ".jpeg")
-_MOST = 1e11  # larger values are neither seconds nor degrees
 _RATES_HZ = (0.001, 10_000.0)
-
-
-def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
-    """Poses from a trajectory (`read_trajectory`), or a CSV of joint angles by the robot's kinematics.
-
-    A CSV has a column `t_s` and one of degrees for every joint of torso and neck, such as
-    `torso_pitch_deg`. Without a file the base frame is the camera's own.
-
-    Parameters
-    ----------
-    path : str or Path or None
-    mount : str, optional
-        Camera holder, for joint angles: "level" or "tilted".
-
-    Returns
-    -------
-    times_s : array, shape (m,)
-        One time if the camera does not move, none if the poses are one per frame.
-    T_base_cam : array, shape (m, 4, 4)
-        Camera coordinates to the robot's base frame.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or a column or number is missing.
-
-    Examples
-    --------
-    >>> times_s, T_base_cam = read_pose_source(None)
-    >>> times_s.shape, T_base_cam.shape
-    ((1,), (1, 4, 4))
-    """
-    if path is None:
-        return np.zeros(1), np.eye(4)[None]
-    path = Path(path)
-    if path.suffix.lower() != ".csv" or names_poses(path):
-        return read_trajectory(path)
-    from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub  # not in every installation
-
-    numbers = read_csv(path, ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)]).to_numpy(float)
-    is_bad = ~(np.abs(numbers) <= _MOST).all(axis=1) | (np.diff(numbers[:, 0], prepend=-np.inf) <= 0)
-    if is_bad.any() or len(numbers) == 0:
-        row = 1 + int(np.argmax([*is_bad, True]))
-        raise InputError(f"{path}: row {row}: expected numbers, and a t_s after the one before")
-    return numbers[:, 0], load_icub().T_root_camera(np.radians(numbers[:, 1:]), mount)
 
 
 def import_open3d(
@@ -92,7 +40,7 @@ def import_open3d(
     out : str or Path
         Folder of the recording; new or empty.
     poses : tuple of array
-        As `read_pose_source` gives them.
+        As `hicp_lib.recordings.trajectories.read_pose_source` gives them.
     rate_hz : float, optional
         Frames per second; the file's `fps` when left out. The first frame is at time 0.
     depth_units_per_m : float, optional

@@ -13,13 +13,12 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, write_bytes
-from hicp_lib.recordings.c3d import decoded, read_points
+from hicp_lib.recordings.c3d import MAX_RATE_HZ, decoded, read_points
 
 _NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*")
 _MISSING = ("", "NULL", "null", "NaN", "nan", "NAN", "-nan")
 _TIME_CODE = re.compile(r"\d+(:\d+)+([:;.]\d+)*")  # SMPTE, IRIG
 _SAID_ONCE = ("FREQUENCY", "MARKER_NAMES", "NO_OF_FRAMES", "NO_OF_MARKERS")
-_MAX_RATE_HZ = 1e5
 MAX_MARKER_M = 10_000.0  # from the origin, in any direction
 _SHOWN = 40  # characters of a wrong value shown in a message
 
@@ -191,7 +190,7 @@ def _rate_hz(path: Path, header: dict[str, list[str]]) -> float:
     text = (header.get("FREQUENCY") or ["absent"])[0]
     if text == "EXT":
         return math.nan
-    if not _NUMBER.fullmatch(text) or not 0 < float(text) <= _MAX_RATE_HZ:
+    if not _NUMBER.fullmatch(text) or not 0 < float(text) <= MAX_RATE_HZ:
         raise InputError(f"{path}: FREQUENCY is {text[:_SHOWN]!r}; expected measurements per second")
     return float(text)
 

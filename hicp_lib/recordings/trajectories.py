@@ -1,4 +1,8 @@
-"""Camera poses in other tools' formats: TUM, EuRoC, KITTI, and Open3D's `trajectory.log`."""
+"""Camera poses from the user: joint angles of the robot, or trajectories in other tools' formats.
+
+These are TUM, where a single line means a camera that does not move, EuRoC, KITTI, and Open3D's
+`trajectory.log`.
+"""
 
 from pathlib import Path
 
@@ -6,9 +10,57 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes
-from hicp_lib.recordings.tum import MAX_PLACE_M, read_poses
+from hicp_lib.recordings.recording import read_csv
+from hicp_lib.recordings.tum import MAX_PLACE_M, names_poses, read_poses
+from hicp_lib.recordings.writer import Poses
 
 _ROTATION_TOLERANCE = 0.01  # tolerance of R Rᵀ from the identity, since files are rounded
+_MOST = 1e11  # larger values are neither seconds nor degrees
+
+
+def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
+    """Poses from a trajectory (`read_trajectory`), or a CSV of joint angles by the robot's kinematics.
+
+    A CSV has a column `t_s` and one of degrees for every joint of torso and neck, such as
+    `torso_pitch_deg`. Without a file the base frame is the camera's own.
+
+    Parameters
+    ----------
+    path : str or Path or None
+    mount : str, optional
+        Camera holder, for joint angles: "level" or "tilted".
+
+    Returns
+    -------
+    times_s : array, shape (m,)
+        One time if the camera does not move, none if the poses are one per frame.
+    T_base_cam : array, shape (m, 4, 4)
+        Camera coordinates to the robot's base frame.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or a column or number is missing.
+
+    Examples
+    --------
+    >>> times_s, T_base_cam = read_pose_source(None)
+    >>> times_s.shape, T_base_cam.shape
+    ((1,), (1, 4, 4))
+    """
+    if path is None:
+        return np.zeros(1), np.eye(4)[None]
+    path = Path(path)
+    if path.suffix.lower() != ".csv" or names_poses(path):
+        return read_trajectory(path)
+    from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub  # not in every installation
+
+    numbers = read_csv(path, ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)]).to_numpy(float)
+    is_bad = ~(np.abs(numbers) <= _MOST).all(axis=1) | (np.diff(numbers[:, 0], prepend=-np.inf) <= 0)
+    if is_bad.any() or len(numbers) == 0:
+        row = 1 + int(np.argmax([*is_bad, True]))
+        raise InputError(f"{path}: row {row}: expected numbers, and a t_s after the one before")
+    return numbers[:, 0], load_icub().T_root_camera(np.radians(numbers[:, 1:]), mount)
 
 
 def read_trajectory(path: str | Path) -> tuple[np.ndarray, np.ndarray]:

@@ -36,7 +36,7 @@ KINDS = {
     "recordings": (["hicp_lib.experiments.recordings.simulate"], ()),
     "avoidance": (["hicp_lib.experiments.avoidance.runs"], ("hicp_lib.detectors.registry",)),
     "detections of mediapipe": (["hicp_lib.detectors.mediapipe.tasks"], ()),
-    "detections of openpose": (["hicp_lib.detectors.openpose.user_network"], ()),
+    "detections of openpose": (["hicp_lib.detectors.openpose.networks"], ()),
     "detections of mmpose": (["hicp_lib.detectors.onnx.mmpose"], ()),
     "tables": (["hicp_lib.lifting.table", "hicp_lib.core.cached_tables"], ()),
 }

@@ -33,7 +33,7 @@ def test_without_its_model_a_detector_says_the_commands(name, tmp_path, monkeypa
 
 @pytest.mark.parametrize("name", DETECTORS)
 def test_an_unknown_option_is_refused(name):
-    with pytest.raises(InputError, match="has no option 'colour'"):
+    with pytest.raises(InputError, match="option 'colour' is not known; expected one of: "):
         make_detector(name, colour="blue", model="m.onnx")
 
 

@@ -18,10 +18,9 @@ from hicp_lib.mocap.clicking import read_clicks
 from hicp_lib.mocap.registration import read_registration
 from hicp_lib.recordings.c3d import write_c3d
 from hicp_lib.recordings.check import check_recording
-from hicp_lib.recordings.importing import read_pose_source
 from hicp_lib.recordings.qualisys import MotionCapture, read_mocap, write_tsv
 from hicp_lib.recordings.recording import open_recording, read_joints, read_truth
-from hicp_lib.recordings.trajectories import read_trajectory
+from hicp_lib.recordings.trajectories import read_pose_source, read_trajectory
 from hicp_lib.recordings.tum import read_file_list
 from hicp_lib.robot.kinematics import HEAD_JOINTS
 from tests.recordings.c3d_files import make_c3d

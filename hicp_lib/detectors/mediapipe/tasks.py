@@ -19,6 +19,7 @@ MediaPipe's outputs and how they are converted:
 """
 
 from pathlib import Path
+from typing import TypedDict, Unpack
 
 import numpy as np
 
@@ -26,11 +27,29 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.core.keypoints import COCO_17, to_halpe
 from hicp_lib.detectors.combined.arbitration import Hands, give_hands, in_pairs, nearest_first
+from hicp_lib.detectors.combined.hand_squares import WRISTS
 from hicp_lib.detectors.mediapipe import bundles, child
 from hicp_lib.detectors.mediapipe.program import program_folder, program_version
 from hicp_lib.detectors.runtime.isolation import IsolatedProcess
 
-_WRISTS = [9, 10]
+
+class TaskOptions(TypedDict, total=False):
+    """Options of each of MediaPipe's tasks.
+
+    Attributes
+    ----------
+    min_score : float
+        Threshold of MediaPipe's detector of people or palms, and of its presence check; 0.5 by default.
+    model : str or Path or None
+        An official `.task` bundle to use in place of the fetched weights.
+    tracking_hz : float
+        Rate of a video whose images come one after the other; 0, the default, for images that stand by
+        themselves.
+    """
+
+    min_score: float
+    model: str | Path | None
+    tracking_hz: float
 
 
 class _Task:
@@ -39,7 +58,12 @@ class _Task:
     name: str
 
     def _prepare(
-        self, task: str, n: int, min_score: float, model: str | Path | None, tracking_hz: float
+        self,
+        task: str,
+        n: int,
+        min_score: float = 0.5,
+        model: str | Path | None = None,
+        tracking_hz: float = 0,
     ) -> None:
         """Starts at the first image, as it takes half a second; with a user's bundle at once."""
         bundle = bundles.read_bundle(task, model) if model else bundles.assemble(task)
@@ -66,30 +90,18 @@ class MediaPipePose(_Task):
     ----------
     num_poses : int
         Maximum number of people per image; 1, as in the paper, suits crops of one person.
-    min_score : float
-        Threshold of MediaPipe's person detector and of its presence check.
-    model : str or Path, optional
-        An official `.task` bundle to use in place of the fetched weights.
-    tracking_hz : float, optional
-        Rate of a video whose images come one after the other; 0 for images that stand by themselves.
+    **options : object
+        See `TaskOptions`.
     """
 
     name = "mediapipe-pose"
 
-    def __init__(
-        self,
-        num_poses: int = 1,
-        min_score: float = 0.5,
-        model: str | Path | None = None,
-        tracking_hz: float = 0,
-    ) -> None:
-        self._prepare("pose", num_poses, min_score, model, tracking_hz)
+    def __init__(self, num_poses: int = 1, **options: Unpack[TaskOptions]) -> None:
+        self._prepare("pose", num_poses, **options)
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
         people = self._process.ask(image)
-        if not len(people):
-            return Detections.none()
         scores = to_halpe(np.clip(people[..., 2], 0, 1), "mediapipe_pose33", axis=-1, fill=0.0)
         keypoints_px = to_halpe(_positions_px(people[..., :2], image), "mediapipe_pose33", axis=-2)
         return Detections(keypoints_px, scores, scores[:, COCO_17].mean(axis=1))
@@ -105,30 +117,18 @@ class MediaPipeHands(_Task):
     ----------
     num_hands : int
         Maximum number of hands per image.
-    min_score : float
-        Threshold of MediaPipe's palm detector and of its presence check.
-    model : str or Path, optional
-        An official `.task` bundle to use in place of the fetched weights.
-    tracking_hz : float, optional
-        Rate of a video whose images come one after the other; 0 for images that stand by themselves.
+    **options : object
+        See `TaskOptions`.
     """
 
     name = "mediapipe-hands"
 
-    def __init__(
-        self,
-        num_hands: int = 2,
-        min_score: float = 0.5,
-        model: str | Path | None = None,
-        tracking_hz: float = 0,
-    ) -> None:
-        self._prepare("hand", num_hands, min_score, model, tracking_hz)
+    def __init__(self, num_hands: int = 2, **options: Unpack[TaskOptions]) -> None:
+        self._prepare("hand", num_hands, **options)
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find hands in an RGB image, shape (height, width, 3), uint8, paired into instances."""
         hands = self._process.ask(image)
-        if not len(hands):
-            return Detections.none()
         scores = np.repeat(np.minimum(hands[:, :1, 1], 1.0), child.N_HAND, axis=1)
         return in_pairs(Hands(_positions_px(hands[:, 1:], image), scores, hands[:, 0, 0].astype(int)))
 
@@ -155,8 +155,8 @@ class MediaPipe:
 
     def __init__(self, num_people: int = 1, min_score: float = 0.5, tracking_hz: float = 0) -> None:
         self.parts: dict[str, MediaPipePose | MediaPipeHands] = {
-            "pose": MediaPipePose(num_people, min_score, tracking_hz=tracking_hz),
-            "hands": MediaPipeHands(2 * num_people, min_score, tracking_hz=tracking_hz),
+            "pose": MediaPipePose(num_people, min_score=min_score, tracking_hz=tracking_hz),
+            "hands": MediaPipeHands(2 * num_people, min_score=min_score, tracking_hz=tracking_hz),
         }
         self.settings = {name: part.settings for name, part in self.parts.items()}
 
@@ -175,7 +175,7 @@ def attach_hands(bodies: Detections, found: Detections) -> Detections:
         The bodies with their hands, then instances of the hands without a free wrist.
     """
     hands = Hands.of(found)
-    chosen = nearest_first(bodies.keypoints_px[:, _WRISTS], hands, np.full((len(bodies), 2), -1))
+    chosen = nearest_first(bodies.keypoints_px[:, WRISTS], hands, np.full((len(bodies), 2), -1))
     rest = np.setdiff1d(np.arange(len(hands)), chosen)
     return give_hands(bodies, hands, chosen).concatenate(in_pairs(hands.take(rest)))
 

@@ -9,17 +9,17 @@ padded with black; the network gives six rows of 17 keypoints in the same form, 
 score.
 """
 
-from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.detectors.onnx.affine import Regions
-from hicp_lib.detectors.onnx.box_source import BoxSource
-from hicp_lib.detectors.onnx.letterbox import letterbox
-from hicp_lib.detectors.onnx.session import open_committed
+from hicp_lib.detectors.onnx.box_source import BoxOptions, BoxSource
+from hicp_lib.detectors.onnx.fitting import Regions, letterbox
+from hicp_lib.detectors.onnx.session import RunOptions, open_committed
+
+_FILL = (0, 0, 0)
 
 
 class MoveNetThunder:
@@ -27,35 +27,18 @@ class MoveNetThunder:
 
     Parameters
     ----------
-    boxes : str, optional
-    person_model : str or Path, optional
-        See `hicp_lib.detectors.onnx.box_source.BoxSource`.
-    person_min_score, person_max_overlap : float, optional
-        Thresholds of the person finder.
     padding : float
         Factor by which boxes are enlarged before they become squares. Of 1.0, 1.1, 1.25 and 1.5, 1.0 was best
         on development identities (seed 11, 100 scenes), by .01 AP on Basic and .05 on Headless.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
+    **person_boxes : object
+        See `hicp_lib.detectors.onnx.box_source.BoxOptions`.
     """
 
     name = "movenet-thunder"
 
-    def __init__(
-        self,
-        boxes: str | None = None,
-        person_model: str | Path | None = None,
-        person_min_score: float | None = None,
-        person_max_overlap: float | None = None,
-        padding: float = 1.0,
-        provider: str = "cpu",
-        threads: int = 1,
-    ) -> None:
-        self._model = open_committed(f"{self.name}.onnx", provider, threads)
-        self._side_px = self._model.side_px
-        thresholds = {"min_score": person_min_score, "max_overlap": person_max_overlap}
-        self._boxes = BoxSource(boxes, person_model, provider, threads, **thresholds)
+    def __init__(self, padding: float = 1.0, **person_boxes: Unpack[BoxOptions]) -> None:
+        self._boxes = BoxSource(**person_boxes)
+        self._model = open_committed(f"{self.name}.onnx", **self._boxes.run)
         self._padding = padding
         self.takes_boxes = self._boxes.kind == "gt"
         self.settings: dict[str, Any] = {"padding": padding, "model": self._model.settings}
@@ -67,7 +50,7 @@ class MoveNetThunder:
         `boxes_px`, shape (n, 4: x, y, width, height), are used when boxes are "gt".
         """
         boxes, box_scores = self._boxes.find(image, boxes_px)
-        size_px = self._side_px, self._side_px
+        size_px = self._model.size_px
         regions = Regions.around(boxes, size_px, self._padding)
         rows = np.array([self.poses(crop) for crop in regions.crop(image, size_px)]).reshape(-1, 17, 3)
         positions_px, scores = regions.to_image_px(rows[..., 1::-1], (1, 1)), np.clip(rows[..., 2], 0, 1)
@@ -85,9 +68,6 @@ class MoveNetLightning(MoveNetThunder):
     name = "movenet-lightning"
 
 
-_FILL = (0, 0, 0)
-
-
 class MoveNetMultiPose:
     """MoveNet MultiPose Lightning: 17 body points of up to six people.
 
@@ -95,25 +75,24 @@ class MoveNetMultiPose:
     ----------
     min_person_score : float
         People with a lower score are dropped; the network always gives six rows.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
+    **run : object
+        See `hicp_lib.detectors.onnx.session.RunOptions`.
     """
 
     name = "movenet-multipose"
 
-    def __init__(self, min_person_score: float = 0.1, provider: str = "cpu", threads: int = 1) -> None:
-        self._model = open_committed(f"{self.name}.onnx", provider, threads)
-        self._side_px, self._min_person_score = self._model.side_px, min_person_score
+    def __init__(self, min_person_score: float = 0.1, **run: Unpack[RunOptions]) -> None:
+        self._model = open_committed(f"{self.name}.onnx", **run)
+        self._min_person_score = min_person_score
         self.settings = {"min_person_score": min_person_score, "opencv": cv2.__version__}
         self.settings["model"] = self._model.settings
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
-        fitted = letterbox(image, (self._side_px, self._side_px), _FILL)
+        fitted = letterbox(image, self._model.size_px, _FILL)
         (rows,) = self._model.run(cv2.dnn.blobFromImage(fitted.pixels))
         people = rows[0][rows[0, :, 55] >= self._min_person_score].astype(float)
         keypoints = people[:, :51].reshape(-1, 17, 3)
-        positions_px = fitted.to_image_px(keypoints[..., 1::-1] * self._side_px)
+        positions_px = fitted.to_image_px(keypoints[..., 1::-1] * self._model.size_px)
         scores = np.clip(keypoints[..., 2], 0, 1)
         return Detections.of_parts(positions_px, scores, np.clip(people[:, 55], 0, 1), "coco17")

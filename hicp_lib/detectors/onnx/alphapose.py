@@ -1,19 +1,17 @@
 """AlphaPose's networks on the user's own weights: boxes, one pass per person, poses merged."""
 
-from functools import partial
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.detectors.onnx import pose_nms
-from hicp_lib.detectors.onnx.affine import Regions
-from hicp_lib.detectors.onnx.box_source import BoxSource
-from hicp_lib.detectors.onnx.decode import decode_combined, decode_integral, decode_quarter
-from hicp_lib.detectors.onnx.facts import TEXTS, Fact, facts
-from hicp_lib.detectors.onnx.pose_net import Decoder, PoseNet
-from hicp_lib.detectors.onnx.session import OnnxModel, open_model
+from hicp_lib.detectors.onnx.decode import Decoded, decode_combined, decode_integral, decode_quarter
+from hicp_lib.detectors.onnx.fitting import Regions
+from hicp_lib.detectors.onnx.session import TEXTS, Fact, facts
+from hicp_lib.detectors.onnx.top_down import TopDown, TopDownOptions
 
 # Points of face and hands at the end of a set, or of the hands alone.
 _N_INTEGRAL = {"halpe136": 110, "wholebody133": 110, "halpe68_noface": 42}
@@ -25,78 +23,61 @@ _MEAN, _STD = (0.406 * 255, 0.457 * 255, 0.480 * 255), (255.0,) * 3
 _GREATEST_WEIGHT = 1.25
 
 
-class AlphaPose:
+class AlphaPose(TopDown):
     """AlphaPose's networks (FastPose and others) with 17, 26, 68, 133 or 136 keypoints.
 
     Parameters
     ----------
     model : str or Path
         ONNX export.
-    person_model : str or Path, optional
-    boxes : str, optional
-        See `hicp_lib.detectors.onnx.box_source.BoxSource`.
-    person_family : str, optional
-    person_min_score, person_max_overlap : float, optional
-        See `hicp_lib.detectors.onnx.person_boxes.PersonBoxes`.
     decoding : str, optional
         "heatmap", "integral" (symmetric integral regression) or "combined" (face and hands integral); if
         None, detected from the network's output for the mean colour.
-    flip_test : bool
-    input_size_px : list of int, optional
-    provider : str
-    threads : int
-        As for `hicp_lib.detectors.onnx.mmpose.MMPose`.
+    **options : object
+        See `hicp_lib.detectors.onnx.top_down.TopDownOptions`.
     """
 
     name = "alphapose"
 
     def __init__(
-        self,
-        model: str | Path,
-        person_model: str | Path | None = None,
-        boxes: str | None = None,
-        person_family: str | None = None,
-        person_min_score: float | None = None,
-        person_max_overlap: float | None = None,
-        decoding: str | None = None,
-        flip_test: bool = False,
-        input_size_px: list | None = None,
-        provider: str = "cpu",
-        threads: int = 1,
+        self, model: str | Path, decoding: str | None = None, **options: Unpack[TopDownOptions]
     ) -> None:
-        opened = open_model(model, provider, threads)
-        self._net = PoseNet(opened, _MEAN, _STD, flip_test, input_size_px)
-        if self._net.is_simcc:
-            raise opened.refusal("SimCC vectors are not AlphaPose's; expected heat maps, or use mmpose")
-        n_integral = _N_INTEGRAL.get(self._net.convention, 0)
+        super().__init__(model, _MEAN, _STD, **options)
+        if self.is_simcc:
+            raise self.model.refusal("SimCC vectors are not AlphaPose's; expected heat maps, or use mmpose")
+        self._n_integral = _N_INTEGRAL.get(self.convention, 0)
         self._is_told = decoding is None
-        self.decoding = decoding or _told_decoding(self._net.answer[0], n_integral)
-        self._decode = _decoder(opened, self.decoding, n_integral)
-        self._rules = _rules(self._net.convention, self.decoding)
-        own = {"family": person_family, "min_score": person_min_score, "max_overlap": person_max_overlap}
-        self._boxes = BoxSource(boxes, person_model, provider, threads, **own)
-        self.takes_boxes = self._boxes.kind == "gt"
-        self.settings = {"model": opened.settings, "decoding": self.decoding, "flip_test": flip_test}
-        self.settings |= self._boxes.settings
+        self.decoding = decoding or _told_decoding(self.answer[0], self._n_integral)
+        refuse_unknown("decoding", self.decoding, _SCORES)
+        if self.decoding == "combined" and not self._n_integral:
+            raise InputError(f"{model}: has no face and hands; expected decoding heatmap or integral")
+        self._rules = _rules(self.convention, self.decoding)
+        self.settings["decoding"] = self.decoding
 
-    def detect(self, image: np.ndarray, boxes_px: np.ndarray | None = None) -> Detections:
-        """Find people in an RGB image; parameters as in `MMPose.detect`."""
-        boxes, box_scores = self._boxes.find(image, boxes_px)
-        if not len(boxes):
-            return Detections.none()
-        regions = Regions.around(boxes, self._net.input_size_px)
-        positions_px, scores = self._net.find(image, regions, self._decode)
-        rows, positions_px, scores = pose_nms.merge_poses(positions_px, scores, boxes, self._rules)
+    def _decode_maps(self, maps: np.ndarray) -> Decoded:
+        """As of `TopDown`."""
+        if self.decoding == "combined":
+            return decode_combined(maps, self._n_integral)
+        return (
+            decode_integral(maps)
+            if self.decoding == "integral"
+            else decode_quarter(maps, needs_both_axes=True)
+        )
+
+    def _people(
+        self, found: Decoded, box_scores: np.ndarray, boxes: np.ndarray, regions: Regions
+    ) -> Detections:
+        """As of `TopDown`: poses merged."""
+        rows, positions_px, scores = pose_nms.merge_poses(*found, boxes, self._rules)
         greatest = scores.max(axis=1, initial=0)
         person_scores = scores.mean(axis=1) + box_scores[rows] + _GREATEST_WEIGHT * greatest
-        return Detections.of_parts(positions_px, np.clip(scores, 0, 1), person_scores, self._net.convention)
+        return Detections.of_parts(positions_px, np.clip(scores, 0, 1), person_scores, self.convention)
 
     def describe(self) -> list[Fact]:
         """What is assumed about the model."""
         told = "from its output for the mean colour" if self._is_told else "given"
         score = {"score": _SCORES[self.decoding], "greatest_weight": _GREATEST_WEIGHT}
-        own = facts("alphapose", told=told, **score, **self.settings)
-        return [*self._net.describe(), *own, *self._boxes.describe()]
+        return self.described(facts("alphapose", told=told, **score, **self.settings))
 
 
 def _told_decoding(maps: np.ndarray, n_integral: int) -> str:
@@ -105,15 +86,6 @@ def _told_decoding(maps: np.ndarray, n_integral: int) -> str:
     if is_logits.all():
         return "integral"
     return "combined" if n_integral and is_logits[-n_integral:].mean() > 0.5 else "heatmap"
-
-
-def _decoder(model: OnnxModel, decoding: str, n_integral: int) -> Decoder:
-    refuse_unknown("decoding", decoding, _SCORES)
-    if decoding == "combined":
-        if not n_integral:
-            raise InputError(f"{model.path}: has no face and hands; expected decoding heatmap or integral")
-        return partial(decode_combined, n_integral=n_integral)
-    return decode_integral if decoding == "integral" else partial(decode_quarter, needs_both_axes=True)
 
 
 def _rules(convention: str, decoding: str) -> pose_nms.PoseNmsRules:

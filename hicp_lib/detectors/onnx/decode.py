@@ -37,17 +37,11 @@ def decode_quarter(maps: np.ndarray, *, needs_both_axes: bool = False) -> Decode
     decides this axis by axis, AlphaPose (`needs_both_axes`) moves along both axes or none.
     """
     cells, scores = peaks(maps)
-    width, height = maps.shape[3], maps.shape[2]
-    x, y = cells[..., 0], cells[..., 1]
-    inner_x, inner_y = (1 < x) & (x < width - 1), (1 < y) & (y < height - 1)
-    if needs_both_axes:
-        moves_x = moves_y = inner_x & inner_y
-    else:
-        moves_x, moves_y = inner_x & (0 < y), inner_y & (0 < x)
+    inner = (1 < cells) & (cells < np.array(maps.shape[:1:-1]) - 1)
+    moves = inner.all(axis=-1, keepdims=True) if needs_both_axes else inner & (0 < cells[..., ::-1])
     at = _around(maps, cells)
     step = np.stack([at(1, 0) - at(-1, 0), at(0, 1) - at(0, -1)], axis=-1)
-    moved = cells + 0.25 * np.sign(step) * np.stack([moves_x, moves_y], axis=-1)
-    return given(moved, scores)
+    return given(cells + 0.25 * np.sign(step) * moves, scores)
 
 
 @np.errstate(invalid="ignore", over="ignore")  # a network may return infinity
@@ -64,10 +58,8 @@ def decode_dark(maps: np.ndarray, kernel: int = 11) -> Decoded:
     dxx = 0.25 * (log(2, 0) - 2 * middle + log(-2, 0))
     dyy = 0.25 * (log(0, 2) - 2 * middle + log(0, -2))
     dxy = 0.25 * (log(1, 1) - log(1, -1) - log(-1, 1) + log(-1, -1))
-    x, y = cells[..., 0], cells[..., 1]
-    inner = (1 < x) & (x < maps.shape[3] - 2) & (1 < y) & (y < maps.shape[2] - 2)
-    offset = _newton_step(gradient, dxx, dyy, dxy)
-    return given(cells + np.where(inner[..., None], offset, 0.0), scores)
+    inner = ((1 < cells) & (cells < np.array(maps.shape[:1:-1]) - 2)).all(axis=-1, keepdims=True)
+    return given(cells + np.where(inner, _newton_step(gradient, dxx, dyy, dxy), 0.0), scores)
 
 
 @np.errstate(invalid="ignore", over="ignore")

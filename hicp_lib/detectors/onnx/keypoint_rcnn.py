@@ -11,6 +11,7 @@ of a keypoint's score:
 """
 
 from pathlib import Path
+from typing import Unpack
 
 import cv2
 import numpy as np
@@ -18,9 +19,8 @@ import numpy as np
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import refuse_unknown
 from hicp_lib.detectors.onnx.decode import decode_roi_maps, given
-from hicp_lib.detectors.onnx.facts import Fact, facts
-from hicp_lib.detectors.onnx.letterbox import Letterbox, letterbox
-from hicp_lib.detectors.onnx.session import Port, open_model
+from hicp_lib.detectors.onnx.fitting import Letterbox, letterbox
+from hicp_lib.detectors.onnx.session import Fact, Port, RunOptions, facts, open_model
 
 _N_KEYPOINTS = 17
 _LOGIT_MIDDLE = 2.0
@@ -45,22 +45,16 @@ class KeypointRcnn:
         "detectron2" or "torchvision"; detected from the outputs if None.
     min_score : float
         Minimum box score of a person.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
+    **run : object
+        See `hicp_lib.detectors.onnx.session.RunOptions`.
     """
 
     name = "detectron2"
 
     def __init__(
-        self,
-        model: str | Path,
-        family: str | None = None,
-        min_score: float = 0.05,
-        provider: str = "cpu",
-        threads: int = 1,
+        self, model: str | Path, family: str | None = None, min_score: float = 0.05, **run: Unpack[RunOptions]
     ) -> None:
-        self._model = open_model(model, provider, threads)
+        self._model = open_model(model, **run)
         shape = self._model.inputs[0].shape
         if shape[:-3] not in ((), (1,), (None,)) or shape[-3:-2] not in ((3,), (None,)):
             raise self._model.refusal("expected an input of one image, (3, h, w)")
@@ -79,9 +73,7 @@ class KeypointRcnn:
         keep = (roles["scores"] >= self._min_score) & np.isfinite(roles["boxes"]).all(axis=1)
         people = {name: role[keep] for name, role in roles.items()}
         positions_px, scores = self._keypoints(people)
-        positions_px = positions_px / fitted.scale
-        if self._family == "detectron2":
-            positions_px = positions_px - 0.5
+        positions_px = positions_px / fitted.scale - (0.5 if self._family == "detectron2" else 0.0)
         return Detections.of_parts(*given(positions_px, scores), people["scores"], "coco17")
 
     def describe(self) -> list[Fact]:

@@ -1,20 +1,18 @@
 """MMPose's top-down networks on the user's own weights: boxes, then one pass and one pose per person."""
 
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import refuse_unknown
 from hicp_lib.core.keypoints import SIGMAS, TO_HALPE
-from hicp_lib.detectors.onnx.affine import Regions
-from hicp_lib.detectors.onnx.box_source import BoxSource
-from hicp_lib.detectors.onnx.decode import decode_dark, decode_dark_udp, decode_quarter
-from hicp_lib.detectors.onnx.facts import Fact, facts
-from hicp_lib.detectors.onnx.letterbox import IMAGENET_RGB
-from hicp_lib.detectors.onnx.pose_net import PoseNet
+from hicp_lib.detectors.onnx.decode import Decoded, decode_dark, decode_dark_udp, decode_quarter
+from hicp_lib.detectors.onnx.fitting import IMAGENET_RGB, Regions
 from hicp_lib.detectors.onnx.pose_nms import oks_nms
-from hicp_lib.detectors.onnx.session import OnnxModel, open_model
+from hicp_lib.detectors.onnx.session import Fact, OnnxModel, facts
+from hicp_lib.detectors.onnx.top_down import TopDown, TopDownOptions
 
 # RTMW's head enlarges features by shuffling pixels; the other SimCC heads do not. Its scores reach about ten.
 _RTMW_OPERATOR, _RTMW_SCALE = "DepthToSpace", 10.0
@@ -25,102 +23,66 @@ _MIN_PATCH_PX = 14
 _MIN_COUNTED_SCORE = 0.2
 
 
-class MMPose:
+class MMPose(TopDown):
     """MMPose's top-down networks: heat maps (HRNet, ViTPose) and SimCC (RTMPose, DWPose, RTMW, RTMW3D).
 
     Parameters
     ----------
     model : str or Path
         ONNX export, whole body (133 points), Halpe (26, 136), COCO (17), CrowdPose (14) or one hand (21).
-    person_model : str or Path, optional
-    boxes : str, optional
-        See `hicp_lib.detectors.onnx.box_source.BoxSource`.
-    person_family : str, optional
-    person_min_score, person_max_overlap : float, optional
-        See `hicp_lib.detectors.onnx.person_boxes.PersonBoxes`.
     dark : bool
         Decode heat maps aware of their distribution (the "dark" configurations).
     udp : bool, optional
         The network was trained with unbiased data processing ("udp" configurations, ViTPose, Sapiens): its
         transform and decoding; if None, detected from the file's metadata `udp` or its patches, else False.
-    flip_test : bool
-        Also run the mirrored crops, and average.
     score_scale : float, optional
         Network score that counts as 1; if None, 10 for RTMW's head and 1 otherwise.
     hand : str
         "left" or "right", the hand that a one-hand network sees.
-    input_size_px : list of int, optional
-        Width and height of the crops, if the file leaves them open.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
+    **options : object
+        See `hicp_lib.detectors.onnx.top_down.TopDownOptions`.
     """
 
     name = "mmpose"
 
     def __init__(
-        self,
-        model: str | Path,
-        person_model: str | Path | None = None,
-        boxes: str | None = None,
-        person_family: str | None = None,
-        person_min_score: float | None = None,
-        person_max_overlap: float | None = None,
-        dark: bool = True,
-        udp: bool | None = None,
-        flip_test: bool = False,
-        score_scale: float | None = None,
-        hand: str = "right",
-        input_size_px: list | None = None,
-        provider: str = "cpu",
-        threads: int = 1,
-    ) -> None:
-        opened, self._dark = open_model(model, provider, threads), dark
-        self._net = PoseNet(opened, *IMAGENET_RGB, flip_test, input_size_px)
-        self._udp, self._udp_from = _told_udp(opened, self._net.is_simcc, udp)
-        if self._udp and (self._net.is_simcc or not dark):
-            raise opened.refusal("UDP is for heat maps decoded by DARK; leave out udp, or dark false")
-        self._decode = decode_dark_udp if self._udp else decode_dark if dark else decode_quarter
-        is_rtmw = self._net.is_simcc and _RTMW_OPERATOR in opened.told.operators
+        self, model: str | Path, dark: bool = True, udp: bool | None = None, score_scale: float | None = None,
+        hand: str = "right", **options: Unpack[TopDownOptions],
+    ) -> None:  # fmt: skip
+        super().__init__(model, *IMAGENET_RGB, **options)
+        self._dark = dark
+        self.udp, self._udp_from = _told_udp(self.model, self.is_simcc, udp)
+        if self.udp and (self.is_simcc or not dark):
+            raise self.model.refusal("UDP is for heat maps decoded by DARK; leave out udp, or dark false")
+        is_rtmw = self.is_simcc and _RTMW_OPERATOR in self.model.told.operators
         self._score_scale = score_scale or (_RTMW_SCALE if is_rtmw else 1.0)
-        self._convention = _hand_convention(self._net.convention, hand)
-        own = {"family": person_family, "min_score": person_min_score, "max_overlap": person_max_overlap}
-        self._boxes = BoxSource(boxes, person_model, provider, threads, **own)
-        self.takes_boxes = self._boxes.kind == "gt"
-        self._sigmas = SIGMAS["wholebody"][TO_HALPE[self._convention]]
-        self.settings = {"model": opened.settings, "dark": dark, "flip_test": flip_test}
-        self.settings |= {"score_scale": self._score_scale, "convention": self._convention}
-        self.settings |= {"udp": self._udp, "input_size_px": self._net.input_size_px}
-        self.settings |= self._boxes.settings
+        refuse_unknown("hand", hand, ("left", "right"))
+        if self.convention.endswith("hand21"):
+            self.convention = f"{hand}_hand21"
+        self._sigmas = SIGMAS["wholebody"][TO_HALPE[self.convention]]
+        self.settings |= {"score_scale": self._score_scale, "convention": self.convention}
+        self.settings |= {"udp": self.udp, "dark": dark, "input_size_px": self.input_size_px}
 
-    def detect(self, image: np.ndarray, boxes_px: np.ndarray | None = None) -> Detections:
-        """Find people in an RGB image, shape (height, width, 3), uint8.
+    def _decode_maps(self, maps: np.ndarray) -> Decoded:
+        """As of `TopDown`."""
+        return (decode_dark_udp if self.udp else decode_dark if self._dark else decode_quarter)(maps)
 
-        `boxes_px`, shape (n, 4: x, y, width, height), are used when boxes are "gt".
-        """
-        boxes, box_scores = self._boxes.find(image, boxes_px)
-        if not len(boxes):
-            return Detections.none()
-        regions = Regions.around(boxes, self._net.input_size_px, udp=self._udp)
-        positions_px, raw_scores = self._net.find(image, regions, self._decode)
+    def _people(
+        self, found: Decoded, box_scores: np.ndarray, boxes: np.ndarray, regions: Regions
+    ) -> Detections:
+        """As of `TopDown`: of two poses of one person, the better."""
+        positions_px, raw_scores = found
         scores = np.clip(raw_scores / self._score_scale, 0, 1)
         person_scores = box_scores * _mean_above(raw_scores, _MIN_COUNTED_SCORE)
-        areas = regions.sizes_px.prod(axis=1)
-        keep = oks_nms(positions_px, person_scores, areas, self._sigmas)
-        return Detections.of_parts(positions_px[keep], scores[keep], person_scores[keep], self._convention)
+        keep = oks_nms(positions_px, person_scores, regions.sizes_px.prod(axis=1), self._sigmas)
+        return Detections.of_parts(positions_px[keep], scores[keep], person_scores[keep], self.convention)
 
     def describe(self) -> list[Fact]:
         """What is assumed about the model."""
-        transform = "UDP: sizes minus one" if self._udp else "classic, not UDP"
+        transform = "UDP: sizes minus one" if self.udp else "classic, not UDP"
         how = {"transform": transform, "transform_from": self._udp_from, "least": _MIN_COUNTED_SCORE}
         how["decoding"] = "heat maps, DARK" if self._dark else "heat maps, quarter cell"
-        own = facts("mmpose SimCC" if self._net.is_simcc else "mmpose", **how, **self.settings)
-        return [*self._net.describe(), *own, *self._boxes.describe()]
-
-
-def _hand_convention(convention: str, hand: str) -> str:
-    refuse_unknown("hand", hand, ("left", "right"))
-    return f"{hand}_hand21" if convention.endswith("hand21") else convention
+        return self.described(facts("mmpose SimCC" if self.is_simcc else "mmpose", **how, **self.settings))
 
 
 def _told_udp(model: OnnxModel, is_simcc: bool, given: bool | None) -> tuple[bool, str]:

@@ -7,17 +7,17 @@ per row) or after it (corners, and the class behind the score). The padding valu
 """
 
 from pathlib import Path
+from typing import Unpack
 
 import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.onnx.decode import given
-from hicp_lib.detectors.onnx.facts import Fact, facts
-from hicp_lib.detectors.onnx.letterbox import letterbox
+from hicp_lib.detectors.onnx.fitting import letterbox
 from hicp_lib.detectors.onnx.person_boxes import DEFAULT_SIDE_PX, FILL, N_BOX, unsuppressed
-from hicp_lib.detectors.onnx.pose_net import CONVENTIONS, convention_of
-from hicp_lib.detectors.onnx.session import open_model
+from hicp_lib.detectors.onnx.session import Fact, RunOptions, facts, open_model
+from hicp_lib.detectors.onnx.top_down import CONVENTIONS, convention_of
 
 _N_COLUMNS = {N_BOX + 3 * n_keypoints for n_keypoints in CONVENTIONS}
 
@@ -33,24 +33,18 @@ class OneStage:
         Minimum score of a person.
     max_overlap : float
         Maximum intersection over union of two people's boxes.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
+    **run : object
+        See `hicp_lib.detectors.onnx.session.RunOptions`.
     """
 
     name = "one-stage"
 
     def __init__(
-        self,
-        model: str | Path,
-        min_score: float = 0.1,
-        max_overlap: float = 0.65,
-        provider: str = "cpu",
-        threads: int = 1,
+        self, model: str | Path, min_score: float = 0.1, max_overlap: float = 0.65, **run: Unpack[RunOptions]
     ) -> None:
-        self._model = open_model(model, provider, threads)
+        self._model = open_model(model, **run)
         self._min_score, self._max_overlap = min_score, max_overlap
-        height, width = self._model.image_size_px
+        width, height = self._model.size_px
         match self._model.told.metadata.get("imgsz"):  # Ultralytics' name of the exported task
             case [int(open_height), int(open_width)]:
                 self._size_px = width or open_width, height or open_height

@@ -8,13 +8,13 @@ boxes with lower scores, and boxes may reach beyond the image.
 """
 
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
 from hicp_lib.core.errors import refuse_unknown
-from hicp_lib.detectors.onnx.facts import Fact, facts
-from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, blob, letterbox
-from hicp_lib.detectors.onnx.session import open_model
+from hicp_lib.detectors.onnx.fitting import IMAGENET_BGR, blob, letterbox
+from hicp_lib.detectors.onnx.session import Fact, RunOptions, facts, open_model
 
 FILL = (114, 114, 114)
 _NORMALISATIONS = {"yolox": ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), "rtmdet": IMAGENET_BGR}
@@ -36,33 +36,31 @@ class PersonBoxes:
     ----------
     model : str or Path
         ONNX export.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
     family : str, optional
         "yolox" or "rtmdet"; detected from the first convolution if None.
     min_score : float
         Minimum score of a box.
     max_overlap : float
         Maximum intersection over union of two boxes, if the export does no suppression itself.
+    **run : object
+        See `hicp_lib.detectors.onnx.session.RunOptions`.
     """
 
     def __init__(
         self,
         model: str | Path,
-        provider: str = "cpu",
-        threads: int = 1,
         family: str | None = None,
         min_score: float = 0.3,
         max_overlap: float = 0.45,
+        **run: Unpack[RunOptions],
     ) -> None:
-        self._model = open_model(model, provider, threads)
+        self._model = open_model(model, **run)
         folds = self._model.told.first_convolution[1:2] == (_FOLDED_CHANNELS,)
         self._is_told = family is None
         self._family = family or ("yolox" if folds else "rtmdet")
         refuse_unknown("person_family", self._family, _NORMALISATIONS)
         self._min_score, self._max_overlap = min_score, max_overlap
-        height, width = self._model.image_size_px
+        width, height = self._model.size_px
         self._size_px = width or DEFAULT_SIDE_PX, height or DEFAULT_SIDE_PX
         self._cells = _cells(self._size_px)
         rows = self._rows(self._model.response_to_zeros(*self._size_px[::-1]))
@@ -75,16 +73,14 @@ class PersonBoxes:
         fitted = letterbox(image, self._size_px, FILL)
         outputs = self._model.run(blob([fitted.pixels], *_NORMALISATIONS[self._family], is_bgr=True))
         rows = self._rows(outputs)
-        suppressed = rows.shape[1] == N_BOX
-        corners, scores, labels = _listed(rows, outputs) if suppressed else self._from_grid(rows)
-        keep = (scores >= self._min_score) & np.isfinite(corners).all(axis=1)
-        keep &= (corners[:, 2:] > corners[:, :2]).all(axis=1)
-        corners, scores, labels = corners[keep] / np.tile(fitted.scale, 2), scores[keep], labels[keep]
-        if not suppressed:
-            rest = unsuppressed(corners, scores, self._max_overlap, side_px=1.0)
-            corners, scores, labels = corners[rest], scores[rest], labels[rest]
-        corners, scores = corners[labels == _PERSON], scores[labels == _PERSON]
-        return np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1), scores
+        is_suppressed = rows.shape[1] == N_BOX
+        corners, scores, labels = _listed(rows, outputs) if is_suppressed else self._from_grid(rows)
+        keep = np.flatnonzero((scores >= self._min_score) & are_boxes(corners))
+        corners = corners / np.tile(fitted.scale, 2)
+        if not is_suppressed:
+            keep = keep[unsuppressed(corners[keep], scores[keep], self._max_overlap, side_px=1.0)]
+        keep = keep[labels[keep] == _PERSON]
+        return with_sizes(corners[keep]), scores[keep]
 
     def describe(self) -> list[Fact]:
         """What is assumed about the model."""
@@ -116,6 +112,16 @@ class PersonBoxes:
         scores = rows[:, 4].astype(float) * rows[:, N_BOX:].max(axis=1)
         scores = np.where(np.isfinite(scores), scores, 0.0)
         return np.concatenate([centre - size / 2, centre + size / 2], axis=1), scores, labels
+
+
+def are_boxes(corners: np.ndarray) -> np.ndarray:
+    """Whether corners (n, 4: left, top, right, bottom) are finite and in this order, shape (n,)."""
+    return np.isfinite(corners).all(axis=1) & (corners[:, 2:] > corners[:, :2]).all(axis=1)
+
+
+def with_sizes(corners: np.ndarray) -> np.ndarray:
+    """Boxes (n, 4: x, y, width, height) from their corners (n, 4: left, top, right, bottom)."""
+    return np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1)
 
 
 def unsuppressed(

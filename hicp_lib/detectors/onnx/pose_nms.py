@@ -130,9 +130,9 @@ def merge_poses(
             rows.append(best)
             merged.append(pose)
         left = np.setdiff1d(left, absorbed)
-    if not rows:
-        return np.zeros(0, int), positions_px[:0], scores[:0]
-    return np.array(rows), np.stack([pose[0] for pose in merged]), np.stack([pose[1] for pose in merged])
+    points, values = ([pose[k] for pose in merged] for k in (0, 1))
+    shape = -1, *positions_px.shape[1:]
+    return np.array(rows, int), np.reshape(points, shape), np.reshape(values, shape[:2])
 
 
 def _distances(pose_px: np.ndarray, others_px: np.ndarray) -> np.ndarray:
@@ -194,6 +194,5 @@ def _merge(
 
 
 def _part_means(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    n_rest = _N_FACE + _N_HANDS
-    parts = values[:, :-n_rest], values[:, -n_rest:-_N_HANDS], values[:, -_N_HANDS:]
+    parts = np.split(values, [-_N_FACE - _N_HANDS, -_N_HANDS], axis=1)
     return tuple(part.mean(axis=1) for part in parts)

@@ -1,4 +1,4 @@
-"""Open ONNX model files with ONNX Runtime: checked, on the requested processor, shared.
+"""Open ONNX model files with ONNX Runtime: checked, on the requested processor, shared; say what is assumed.
 
 A model is opened once per process and shared by all detectors (one per thread); ONNX Runtime's sessions can
 run in several threads at once.
@@ -10,19 +10,56 @@ import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
 
+from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError, one_line
-from hicp_lib.core.files import read_bytes, sha256_bytes
+from hicp_lib.core.files import read_bytes, read_json, sha256_bytes
 from hicp_lib.core.images import MAX_PIXELS
 from hicp_lib.core.limited import raised
-from hicp_lib.detectors.onnx.facts import KNOWN_NETWORKS, Fact
 from hicp_lib.detectors.onnx.model_file import ModelFile, read_model
 from hicp_lib.detectors.onnx.starting import DTYPES, VERSION, available_providers, start, try_out
 from hicp_lib.detectors.weights.default import find, load
 from hicp_lib.detectors.weights.published import check_use
+
+TEXTS = read_json(DATA_DIR / "model_facts.json")
+KNOWN_NETWORKS = ", ".join(TEXTS["networks"])
+"""The networks that the detectors accept, in one line."""
+
+
+class Fact(NamedTuple):
+    """One property of a model.
+
+    Attributes
+    ----------
+    what, value : str
+    why : str
+        How the value was determined.
+    """
+
+    what: str
+    value: str
+    why: str
+
+
+def facts(name: str, **values: Any) -> list[Fact]:
+    """The assumptions about one kind of network.
+
+    Parameters
+    ----------
+    name : str
+        Key of `facts` in `data/model_facts.json`.
+    **values : object
+        Values for the placeholders in braces.
+
+    Examples
+    --------
+    >>> facts("nanodet", min_score=0.3, max_overlap=0.6)[1]
+    Fact(what='person score', value='>= 0.3', why='overlaps above 0.6 are suppressed')
+    """
+    return [Fact(*(text.format(**values) for text in row)) for row in TEXTS["facts"][name]]
 
 
 @dataclass(frozen=True)
@@ -78,8 +115,8 @@ class OnnxModel:
         return {"sha256": self.sha256, "provider": self.provider, "onnxruntime": VERSION}
 
     @property
-    def image_size_px(self) -> tuple[int | None, int | None]:
-        """Height and width of its single input image; None where the model leaves them open.
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of its single input image; 0 where the model leaves them open.
 
         Raises
         ------
@@ -89,21 +126,7 @@ class OnnxModel:
         shape = self.inputs[0].shape
         if len(shape) != 4 or shape[0] not in (None, 1) or shape[1] not in (None, 3):
             raise self.refusal("expected an input of one image, (1, 3, h, w)")
-        return shape[2], shape[3]
-
-    @property
-    def side_px(self) -> int:
-        """Side of its single input image, a square of a fixed size.
-
-        Raises
-        ------
-        InputError
-            If it takes something else.
-        """
-        height, width = self.image_size_px
-        if height is None or height != width:
-            raise self.refusal("expected an input of one square image of a fixed size")
-        return height
+        return shape[3] or 0, shape[2] or 0
 
     def refusal(self, why: str, outputs: list[np.ndarray] | None = None) -> InputError:
         """The error for an unsupported network: what it is, why it is refused, what is supported.
@@ -171,6 +194,21 @@ class OnnxModel:
         return self._responses[size_px]
 
 
+class RunOptions(TypedDict, total=False):
+    """How a network is run: options of every detector that has one.
+
+    Attributes
+    ----------
+    provider : str
+        Execution provider by its short name: cpu (the default), cuda, tensorrt, openvino, ...
+    threads : int
+        Threads of one inference, 1 by default; images already run in parallel, so more rarely help.
+    """
+
+    provider: str
+    threads: int
+
+
 _open: weakref.WeakValueDictionary[tuple, OnnxModel] = weakref.WeakValueDictionary()
 _lock = threading.Lock()
 
@@ -183,9 +221,8 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
     path : str or Path
         The file; one that keeps weights in a second file ("external data") is refused.
     provider : str
-        Execution provider by its short name: cpu, cuda, tensorrt, openvino, ...
     threads : int
-        Threads of one inference; images already run in parallel, so more rarely help.
+        See `RunOptions`.
 
     Raises
     ------

@@ -6,29 +6,29 @@ since the network is trained on right hands.
 """
 
 from pathlib import Path
+from typing import Unpack
 
 import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.keypoints import INDEX, LEFT_HAND, RIGHT_HAND
-from hicp_lib.detectors.onnx.session import open_model
-from hicp_lib.detectors.openpose.mobilenet import STRIDE
-from hicp_lib.detectors.openpose.net_input import feed
-from hicp_lib.detectors.openpose.released import enlarge
+from hicp_lib.detectors.combined.hand_squares import HAND_POINTS, Arms, SquareRule
+from hicp_lib.detectors.onnx.session import RunOptions, open_model
+from hicp_lib.detectors.openpose.paf import STRIDE
+from hicp_lib.detectors.openpose.released import enlarge, feed
 
-_HAND_SIDE_PX, _N_HAND, _MIN_ARM_SCORE = 368, 21, 0.03
+_HAND_SIDE_PX, _N_HAND = 368, 21
 # Position and size of a hand's square, in lengths of the forearm; smaller squares are skipped.
-_BEYOND_WRIST, _SQUARE_SIDE, _FOREARMS_PER_UPPER_ARM, _MIN_AREA_PX2 = 0.33, 1.5, 0.9, 10.0
-_HANDS = {"left": LEFT_HAND, "right": RIGHT_HAND}
+_SQUARES = SquareRule(side=1.5, forearms_per_shoulders=0.0, min_score=0.03)
+_MIN_AREA_PX2 = 10.0
 
 
 class OpenPoseHands:
     """OpenPose's hand network: 21 points of a right hand in a square crop."""
 
-    def __init__(self, model: str | Path, provider: str, threads: int) -> None:
-        self._model = open_model(model, provider, threads)
-        height, width = self._model.image_size_px
+    def __init__(self, model: str | Path, **run: Unpack[RunOptions]) -> None:
+        self._model = open_model(model, **run)
+        width, height = self._model.size_px
         if height != width:
             raise self._model.refusal(f"takes images of {width} x {height}; expected squares, of hands")
         self._side_px = height or _HAND_SIDE_PX
@@ -38,12 +38,13 @@ class OpenPoseHands:
     def complete(self, image: np.ndarray, people: Detections) -> Detections:
         """The people with the hands found at their arms; arms without shoulder, elbow or wrist get none."""
         keypoints_px, scores = people.keypoints_px.copy(), people.scores.copy()
-        for person in range(len(people)):
-            for side, indices in _HANDS.items():
-                square = hand_square(keypoints_px[person], scores[person], side)
-                if square is not None:
-                    found = self.find(image, *square, is_left=side == "left")
-                    keypoints_px[person, indices], scores[person, indices] = found
+        arms = Arms.of(people, _SQUARES)
+        sides_px = _SQUARES.side * np.where(arms.are_whole, arms.scales_px, 0)
+        corners_px = arms.hands_px(_SQUARES) - sides_px[..., None] / 2
+        for person, side in np.argwhere(sides_px**2 > _MIN_AREA_PX2):
+            square = corners_px[person, side], sides_px[person, side]
+            points_px, found = self.find(image, *square, is_left=side == 0)
+            keypoints_px[person, HAND_POINTS[side]], scores[person, HAND_POINTS[side]] = points_px, found
         return Detections(keypoints_px, scores, people.person_scores)
 
     def find(
@@ -84,36 +85,3 @@ class OpenPoseHands:
         if maps.ndim != 4 or maps.shape[1] < _N_HAND or maps.shape[2:] != (cells, cells):
             raise self._model.refusal(f"expected hands' (1, {_N_HAND + 1}, {cells}, {cells})", outputs)
         return maps[0]
-
-
-def hand_square(keypoints_px: np.ndarray, scores: np.ndarray, side: str) -> tuple[np.ndarray, float] | None:
-    """The square in which OpenPose searches for a hand of a person, or None.
-
-    Parameters
-    ----------
-    keypoints_px : array, shape (136, 2)
-    scores : array, shape (136,)
-    side : {"left", "right"}
-
-    Returns
-    -------
-    (array, float) or None
-        Its upper left corner, shape (2,), and its side in pixels.
-
-    Examples
-    --------
-    >>> keypoints_px = np.zeros((136, 2))
-    >>> joints = [INDEX[f"left_{joint}"] for joint in ("wrist", "elbow", "shoulder")]
-    >>> keypoints_px[joints] = (400, 200), (300, 200), (200, 200)
-    >>> corner_px, side_px = hand_square(keypoints_px, np.ones(136), "left")
-    >>> corner_px.tolist(), side_px
-    ([358.0, 125.0], 150.0)
-    """
-    joints = [INDEX[f"{side}_{joint}"] for joint in ("wrist", "elbow", "shoulder")]
-    if not (scores[joints] > _MIN_ARM_SCORE).all():
-        return None
-    wrist, elbow, shoulder = keypoints_px[joints]
-    upper_arm_px = np.linalg.norm(elbow - shoulder)
-    side_px = _SQUARE_SIDE * max(np.linalg.norm(wrist - elbow), _FOREARMS_PER_UPPER_ARM * upper_arm_px)
-    centre = wrist + _BEYOND_WRIST * (wrist - elbow)
-    return (centre - side_px / 2, float(side_px)) if side_px**2 > _MIN_AREA_PX2 else None

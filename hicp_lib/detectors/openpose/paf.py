@@ -99,6 +99,7 @@ Limb = tuple[int, int, float]
 # Values of maps (c, h, w) at input positions (..., 2), given the stride: (c, ...).
 Sampler = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
 
+STRIDE = 8  # input pixels per cell of the networks' maps
 MAX_PEAKS = 64
 _LEAST = 1e-4
 _LEAST_LENGTH_PX = _LEAST_SCORE = 1e-6

@@ -1,9 +1,9 @@
-"""Peaks and affinity fields as OpenPose's released program evaluates them.
+"""Input, peaks and affinity fields as OpenPose's released program has them.
 
-The maps are enlarged to the size of the network's input; a peak is the centroid of the positive values within
-3 pixels of a local maximum, and fields are read at the nearest pixel. `paf` finds peaks in the small maps,
-which is far cheaper and as good; this module is for the original networks, whose results should equal the
-program's (constants and rules: its `net` folder, version 1.7).
+The input is BGR, value / 256 - 0.5, aspect ratio kept. The maps are enlarged to the size of the input; a peak
+is the centroid of the positive values within 3 pixels of a local maximum, and fields are read at the nearest
+pixel. `paf` finds peaks in the small maps, which is far cheaper and as good; this module is for the original
+networks, whose results should equal the program's (constants and rules: its `net` folder, version 1.7).
 
 The program measures image pixels from their corners: it adds half an image pixel to a peak before it reads
 the fields, and keeps it in its results. Here the fields are read at the same places (`offset_px`), but
@@ -28,11 +28,49 @@ from functools import partial
 
 import cv2
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
+from hicp_lib.detectors.onnx.fitting import Letterbox
 from hicp_lib.detectors.openpose.paf import Limb, PafOptions, PartModel, Person, find_limbs, part_rows
 
 _MAX_PEAKS = 127
 _REACH_PX = 3
+# Wider images are scaled down, and the height padded with black.
+_MAX_ASPECT = 16 / 9
+
+
+def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> Letterbox:
+    """Fit an image into the input like OpenPose's program: aspect ratio kept, black right and below.
+
+    The width follows the image's aspect ratio, rounded to a multiple of 16 and at most 16 / 9 of the height.
+    The centres of the first and last pixels coincide.
+
+    Parameters
+    ----------
+    image : array, shape (height, width, 3), dtype uint8
+    height_px : int
+    width_px : int, optional
+        If the network accepts no other.
+
+    Examples
+    --------
+    >>> [fit(np.zeros((h, w, 3), np.uint8), 368).pixels.shape[1] for w, h in ((640, 429), (1280, 425))]
+    [544, 656]
+    """
+    size = np.array(image.shape[1::-1])
+    proportion = min(_MAX_ASPECT, size[0] / size[1])
+    net_size = np.array([width_px or 16 * int(height_px * proportion / 16 + 0.5) or 16, height_px])
+    zoom = ((net_size - 1) / np.maximum(size - 1, 1)).min()
+    flags = cv2.INTER_CUBIC if zoom > 1 else cv2.INTER_AREA
+    pixels = cv2.warpAffine(image, np.eye(2, 3) * zoom, tuple(net_size.tolist()), flags=flags)
+    covered = np.floor(zoom * size + 0.5)
+    back = (np.maximum(size - 1, 1) / np.maximum(covered - 1, 1)).min()
+    return Letterbox(pixels, np.full(2, 1 / back), (0.0, 0.0), 0.0)
+
+
+def feed(pixels: np.ndarray) -> np.ndarray:
+    """The network's input, shape (1, 3, height, width), for an RGB image."""
+    return cv2.dnn.blobFromImage(pixels, 1 / 256, mean=(128.0,) * 3, swapRB=True)
 
 
 def assemble_released(
@@ -82,15 +120,14 @@ def centroid_peaks(heat_map: np.ndarray, min_peak: float) -> np.ndarray:
     There are none at the border itself; one pixel inside, where enlarging produces pairs of equal values,
     equal neighbours are allowed.
     """
-    height, width = heat_map.shape
     # Pixels below their neighbours cannot be peaks: this leaves few to examine closely.
     highest = cv2.dilate(heat_map, np.ones((3, 3), np.uint8))
-    rows, columns = np.nonzero((heat_map > min_peak) & (heat_map >= highest))
+    rows, columns = cells = np.nonzero((heat_map > min_peak) & (heat_map >= highest))
     value = heat_map[rows, columns]
     around = _windows(heat_map, rows, columns, 1, min_peak).reshape(-1, 9)
     others = np.delete(around, 4, axis=1)
-    inner = (1 < columns) & (columns < width - 2) & (1 < rows) & (rows < height - 2)
-    ring = ~inner & (np.isin(columns, (1, width - 2)) | np.isin(rows, (1, height - 2)))
+    to_border = np.minimum(np.stack(cells), np.array(heat_map.shape)[:, None] - 1 - cells).T
+    inner, ring = (to_border > 1).all(axis=1), (to_border == 1).any(axis=1)
     is_peak = inner & (value[:, None] > others).all(axis=1) | ring & (value[:, None] >= others).all(axis=1)
     rows, columns, value = (part[is_peak][:_MAX_PEAKS] for part in (rows, columns, value))
     weights = np.maximum(_windows(heat_map, rows, columns, _REACH_PX, 0.0), 0).astype(float)
@@ -106,8 +143,7 @@ def _windows(
 ) -> np.ndarray:
     """Squares of `values` (h, w) around some cells, `fill` beyond the border: (n, 2 reach + 1, same)."""
     padded = np.pad(values, reach, constant_values=fill)
-    step = np.arange(2 * reach + 1)
-    return padded[rows[:, None, None] + step[:, None], columns[:, None, None] + step]
+    return sliding_window_view(padded, (2 * reach + 1, 2 * reach + 1))[rows, columns]
 
 
 def _nearest(maps: np.ndarray, positions_px: np.ndarray, stride: int, offset_px: float = 0.0) -> np.ndarray:

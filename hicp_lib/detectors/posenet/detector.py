@@ -11,13 +11,14 @@ displacements.
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from typing import Unpack
 
 import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.detectors.onnx.affine import Regions
-from hicp_lib.detectors.onnx.session import open_committed
+from hicp_lib.detectors.onnx.fitting import Regions
+from hicp_lib.detectors.onnx.session import RunOptions, open_committed
 
 STRIDE_PX = 16
 
@@ -150,24 +151,20 @@ class PoseNetMobileNet:
     max_people : int
     min_root_score : float
         See `hicp_lib.detectors.posenet.detector.DecodingRule`.
-    provider : str
-    threads : int
-        See `hicp_lib.detectors.onnx.session.open_model`.
+    **run : object
+        See `hicp_lib.detectors.onnx.session.RunOptions`.
     """
 
     name = "posenet"
 
-    def __init__(
-        self, max_people: int = 5, min_root_score: float = 0.5, provider: str = "cpu", threads: int = 1
-    ) -> None:
-        self._model = open_committed(f"{self.name}.onnx", provider, threads)
-        self._side_px = self._model.side_px
+    def __init__(self, max_people: int = 5, min_root_score: float = 0.5, **run: Unpack[RunOptions]) -> None:
+        self._model = open_committed(f"{self.name}.onnx", **run)
         self._rule = DecodingRule(max_people, min_root_score)
         self.settings = {**asdict(self._rule), "opencv": cv2.__version__, "model": self._model.settings}
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
-        size_px = self._side_px, self._side_px
+        size_px = self._model.size_px
         whole = Regions.whole(image, size_px)
         (square,) = whole.crop(image, size_px)
         positions_px, scores, person_scores = decode(self.maps(square), self._rule)

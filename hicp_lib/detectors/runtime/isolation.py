@@ -28,10 +28,8 @@ from hicp_lib.core.limited import raised
 from hicp_lib.detectors.mediapipe.child import receive, send
 
 # Port 9 ("discard") of this machine: a connection is refused at once.
-_NOWHERE = {
-    **{name: "http://127.0.0.1:9" for name in ("http_proxy", "https_proxy", "all_proxy")},
-    "no_proxy": "localhost",
-}
+_NOWHERE = dict.fromkeys(("http_proxy", "https_proxy", "all_proxy"), "http://127.0.0.1:9")
+_NOWHERE |= {"no_proxy": "localhost"}
 _FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1"}  # NumPy's threads are not needed there
 # A call takes milliseconds, and a start seconds on a busy machine.
 LIMIT_S = 120.0

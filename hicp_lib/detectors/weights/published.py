@@ -18,7 +18,7 @@ from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import cache_dir, read_json, sha256_bytes, sha256_file, write_bytes, write_json
 from hicp_lib.detectors.weights.default import file_status, refuse_other_names, weights_dir
-from hicp_lib.detectors.weights.url_download import download
+from hicp_lib.detectors.weights.downloads import download
 
 REGISTRY_PATH = DATA_DIR / "published_weights.json"
 # Far above any published model; a server or an archive that gives more is not trusted.

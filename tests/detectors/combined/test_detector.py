@@ -262,3 +262,11 @@ def test_options_go_to_the_part_they_name(weights):
     assert detector.settings["hands"]["min_score"] == 0.3
     with pytest.raises(InputError, match="colour"):
         make_detector("combined:mediapipe-pose+mediapipe-hands", colour="blue")
+
+
+def test_hands_are_not_followed_from_one_part_of_an_image_to_the_next(weights):
+    name = "combined:mediapipe-pose+mediapipe-hands"
+    with pytest.raises(InputError, match="leave out hands_tracking_hz") as error:
+        make_detector(name, hands_tracking_hz=30.0)
+    assert "\n" not in str(error.value)
+    assert make_detector(name, tracking_hz=30.0).settings["body"]["tracking_hz"] == 30.0

@@ -16,8 +16,8 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 from hicp_lib.detectors.registry import make_detector
-from hicp_lib.detectors.runtime.cached_parts import Runner
 from hicp_lib.detectors.runtime.isolation import offline_environment
+from hicp_lib.detectors.runtime.results import Runner
 from tests.detectors.conftest import N_PEOPLE
 
 

@@ -64,7 +64,7 @@ def test_detect_with_a_model_of_ones_own(capsys, model, tmp_path):
     assert "cuda" in mistake(capsys, *arguments, "--model", model, "-o", "provider", "cuda")
     assert "expected bool" in mistake(capsys, *arguments, "--model", model, "-o", "dark", "maybe")
     assert "/no.onnx: cannot be read" in mistake(capsys, *arguments, "--model", "/no.onnx")
-    assert "no option 'boxes'" in mistake(
+    assert "option 'boxes' is not known" in mistake(
         capsys, *arguments[:-1], "detectron2", "--model", model, "--boxes", "gt"
     )
 

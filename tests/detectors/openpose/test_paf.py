@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hicp_lib.detectors.openpose import paf
-from hicp_lib.detectors.openpose.mobilenet import COCO_18, fit
+from hicp_lib.detectors.openpose.networks import COCO_18, scaled
 
 STRIDE = 8
 OPTIONS = paf.PafOptions()
@@ -242,7 +242,7 @@ def test_maps_of_noise_end_in_arrays_of_the_right_shape():
 @given(st.integers(20, 900), st.integers(20, 900))
 def test_positions_survive_the_way_into_the_network_and_back(width_px, height_px):
     """A corner of the image is a corner of the scaled part, whatever the rounding."""
-    net_input = fit(np.zeros((height_px, width_px, 3), np.uint8), 368)
+    net_input = scaled(np.zeros((height_px, width_px, 3), np.uint8), 368)
     rows, columns = net_input.pixels.shape[:2]
     assert rows == 368 and columns % 16 == 0
     used = round(net_input.scale[0] * width_px)
@@ -258,7 +258,7 @@ def test_a_bright_spot_is_where_it_was(width_px, height_px):
     y, x = np.indices((height_px, width_px))
     sigma = 0.03 * height_px
     spot = 250 * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * sigma**2))
-    net_input = fit(np.repeat(spot[..., None], 3, axis=2).round().astype(np.uint8), 368)
+    net_input = scaled(np.repeat(spot[..., None], 3, axis=2).round().astype(np.uint8), 368)
     weight = net_input.pixels[..., 0].astype(float)
     rows, columns = np.indices(weight.shape)
     centroid = np.array([(weight * columns).sum(), (weight * rows).sum()]) / weight.sum()

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 
 from hicp_lib.detectors.openpose import paf
 from hicp_lib.detectors.openpose import released as paf_released
-from hicp_lib.detectors.openpose.mobilenet import COCO_18
+from hicp_lib.detectors.openpose.networks import BODY_25, COCO_18
 from hicp_lib.detectors.openpose.released import join_as_released
-from hicp_lib.detectors.openpose.user_network import BODY_25
 from tests.detectors.openpose.test_paf import STANDING, draw, without
 
 OPTIONS = paf.PafOptions()

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from onnx import helper
 
+from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND, TO_HALPE
-from hicp_lib.detectors.openpose.hands import hand_square
-from hicp_lib.detectors.openpose.mobilenet import COCO_18
-from hicp_lib.detectors.openpose.net_input import fit
-from hicp_lib.detectors.openpose.user_network import BODY_25, OpenPose
+from hicp_lib.detectors.openpose.hands import OpenPoseHands
+from hicp_lib.detectors.openpose.networks import BODY_25, COCO_18, OpenPose
+from hicp_lib.detectors.openpose.released import fit
 from tests.detectors.onnx.onnx_models import constant_model, save
 from tests.detectors.openpose.test_paf import STANDING, draw
 
@@ -146,15 +146,24 @@ def test_hands_are_found_at_their_arms_and_on_their_side(tmp_path):
         np.testing.assert_allclose(found.scores[0, indices], 250 / 256, atol=0.12)
 
 
-def test_the_square_of_a_hand_follows_the_arm():
-    points, scores = np.full((136, 2), np.nan), np.zeros(136)
-    points[[5, 7, 9]], scores[[5, 7, 9]] = [(0, 0), (100, 0), (100, 60)], 0.5
-    corner, side = hand_square(points, scores, "left")
-    assert side == pytest.approx(1.5 * 90)  # 0.9 x upper arm is longer than the forearm
+def test_the_square_of_a_hand_follows_the_arm_and_a_part_of_an_arm_has_none(tmp_path, monkeypatch):
+    hands, asked = OpenPoseHands(hand_colours(tmp_path / "hand.onnx")), []
+
+    def find(image, corner_px, side_px, is_left):
+        asked.append((corner_px, side_px, is_left))
+        return np.full((21, 2), 7.0), np.full(21, 0.6)
+
+    monkeypatch.setattr(hands, "find", find)
+    points, scores = np.full((2, 136, 2), np.nan), np.zeros((2, 136))
+    points[:, [5, 7, 9]], scores[:, [5, 7, 9]] = [(0, 0), (100, 0), (100, 60)], 0.5
+    scores[1, 9] = 0.02
+    points[0, [8, 10]], scores[0, [8, 10]] = [(50, 50), (60, 90)], 0.5  # no right shoulder
+    found = hands.complete(IMAGE, Detections(points, scores, np.ones(2)))
+    ((corner, side, is_left),) = asked
+    assert side == pytest.approx(1.5 * 90) and is_left  # 0.9 x upper arm is longer than the forearm
     np.testing.assert_allclose(corner + side / 2, (100, 60 + 0.33 * 60))
-    assert hand_square(points, scores, "right") is None
-    scores[7] = 0.02
-    assert hand_square(points, scores, "left") is None
+    assert (found.keypoints_px[0, LEFT_HAND] == 7).all() and (found.scores[0, LEFT_HAND] == 0.6).all()
+    assert np.isnan(found.keypoints_px[0, RIGHT_HAND]).all() and np.isnan(found.keypoints_px[1, 94:]).all()
 
 
 @pytest.mark.parametrize(

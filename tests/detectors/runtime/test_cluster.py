@@ -163,14 +163,14 @@ def test_what_workers_cannot_do_and_that_they_are_gone_is_said_in_one_line(slow,
         line = refusal(address, registered, "known here only")
         assert line.startswith("worker tcp://") and "detector 'known here only' is not known" in line
         # Weights are read before images.
-        assert "no option 'delay'" in refusal(address, {1: broken}, delay=1)
+        assert "option 'delay' is not known" in refusal(address, {1: broken}, delay=1)
 
         some = {name: registered[name] for name in sorted(registered)[:4]}
         assert refusal(address, some | {"x": broken}).startswith(f"{broken}: is not an image")
         assert slow.n_kept() > 0
         assert refusal(address, {"x": absent}).startswith(f"{absent}: cannot be read")
 
-        write = run.write_result
+        write = run.results.write_result
 
         def write_and_lose(*arguments):
             write(*arguments)
@@ -178,7 +178,7 @@ def test_what_workers_cannot_do_and_that_they_are_gone_is_said_in_one_line(slow,
                 worker.kill()
                 monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
 
-        monkeypatch.setattr(run, "write_result", write_and_lose)
+        monkeypatch.setattr(run.results, "write_result", write_and_lose)
         line = refusal(address, registered)
         assert line.startswith(f"{address}: the Dask cluster is gone (it has lost its workers)")
         assert line.endswith("run the same command again to continue") and slow.n_kept() == 20

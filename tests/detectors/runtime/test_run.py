@@ -220,7 +220,7 @@ def test_real_detectors_do_not_depend_on_threads_or_order(
 ):
     alone = run.detect_images(name, photographs, workers=1)
     backwards = dict(reversed(photographs.items()))
-    monkeypatch.setattr(run, "cache_folder", lambda _: tmp_path / "other")
+    monkeypatch.setattr(cache, "cache_folder", lambda _: tmp_path / "other")
     together = run.detect_images(name, backwards, workers=3)
     for key, result in alone.items():
         for field in ("keypoints_px", "scores", "person_scores"):

@@ -149,8 +149,8 @@ def test_few_results_wait_in_memory_and_all_come_in_order(folder, monkeypatch):
     list(run.detect_each("counting", enumerate(sorted(folder.iterdir())[1:])))
     monkeypatch.setattr(run, "_MOST_WAITING", 3)
     read = []
-    known = run.read_result
-    monkeypatch.setattr(run, "read_result", lambda path: read.append(path) or known(path))
+    known = run.results.read_result
+    monkeypatch.setattr(run.results, "read_result", lambda path: read.append(path) or known(path))
     found = list(run.detect_each("counting", enumerate(sorted(folder.iterdir())), workers=2))
     assert [key for key, _ in found] == list(range(12))
     assert [int(result.detections.keypoints_px[0, 0, 0]) for _, result in found] == [
@@ -158,10 +158,21 @@ def test_few_results_wait_in_memory_and_all_come_in_order(folder, monkeypatch):
     ]  # fmt: skip
 
 
-def test_a_kept_result_that_goes_while_it_waits_is_told(folder, tmp_path):
-    waiting = run.OrderedDict({0: run._Waiting("a.png", tmp_path, tmp_path / "gone.bin")})
-    ((_, answer),) = run._in_order(waiting)
-    assert isinstance(answer, InputError) and "gone.bin: was removed" in str(answer)
+def test_a_kept_result_that_goes_while_it_waits_is_told(folder, monkeypatch):
+    paths = sorted(folder.iterdir())
+    list(run.detect_each("counting", enumerate(paths[1:])))
+    monkeypatch.setattr(run, "_MOST_WAITING", 0)
+    known, read = run.results.read_result, set()
+
+    def read_once(path):
+        if path in read:
+            return None
+        read.add(path)
+        return known(path)
+
+    monkeypatch.setattr(run.results, "read_result", read_once)
+    (_, answer), *_ = list(run.detect_each("counting", enumerate(paths), workers=1))[1:]
+    assert isinstance(answer, InputError) and ".bin: was removed" in str(answer)
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -18,7 +18,7 @@ import pytest
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.detectors.registry import default_detector_names
-from hicp_lib.detectors.weights import default, pip_download
+from hicp_lib.detectors.weights import default, downloads
 
 CONTENT = b"\x00weights\xff" * 1000
 
@@ -164,7 +164,7 @@ def test_an_index_that_says_a_byte_now_and_then_is_left(one_weight, monkeypatch)
                     self.request.sendall(b"x")
                     time.sleep(0.1)
 
-    monkeypatch.setattr(pip_download, "TIMEOUT_S", 5.0)
+    monkeypatch.setattr(downloads, "PIP_TIMEOUT_S", 5.0)
     with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Slow) as server:
         server.daemon_threads = True
         threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}).start()

@@ -23,7 +23,7 @@ from hicp_lib.cli import main as cli
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.detectors.onnx.session import open_model
-from hicp_lib.detectors.weights import published, url_download
+from hicp_lib.detectors.weights import downloads, published
 from hicp_lib.detectors.weights.default import weights_dir
 
 CONTENT = b"\x00network\xff" * 1000
@@ -242,14 +242,14 @@ SLOW = {
 @pytest.mark.parametrize("kind", SLOW)
 def test_a_server_that_never_ends_is_left(tmp_path, monkeypatch, kind):
     match, *says = SLOW[kind]
-    monkeypatch.setattr(url_download, "TIMEOUT_S", 0.5)
+    monkeypatch.setattr(downloads, "TIMEOUT_S", 0.5)
     handler = type("Handler", (Slow,), dict(zip(("head", "again", "pause_s"), says, strict=True)))
     with socketserver.ThreadingTCPServer(("127.0.0.1", 0), handler) as server:
         server.daemon_threads = True
         threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}).start()
         begin_s, url = time.monotonic(), f"http://127.0.0.1:{server.server_address[1]}/net"
         try:
-            problem = url_download.download(url, tmp_path / "net", 10_000)
+            problem = downloads.download(url, tmp_path / "net", 10_000)
         finally:
             server.shutdown()
     assert problem and re.fullmatch(match, problem)

@@ -14,7 +14,7 @@ from packaging.version import Version
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import COCO_17, INDEX
-from hicp_lib.detectors.openpose import mobilenet
+from hicp_lib.detectors.openpose import networks
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.weights import default
 from tests.detectors.plain_people import errors_px, render_person
@@ -77,11 +77,9 @@ def test_it_needs_no_download(tmp_path):
 @pytest.mark.skipif(Version(onnx.__version__) < Version("1.23"), reason="its reference pads strides wrongly")
 def test_its_maps_are_those_of_the_reference_implementation(photograph):
     """On a small part of the photograph: the reference is slow."""
-    detector = mobilenet.OpenPoseMobileNet(net_height_px=96)
-    net_input = mobilenet.fit(photograph, 96)
-    model = ReferenceEvaluator(
-        onnx.load_from_string(default.load(f"{mobilenet.OpenPoseMobileNet.name}.onnx"))
-    )
+    detector = networks.OpenPoseMobileNet(net_height_px=96)
+    net_input = networks.scaled(photograph, 96)
+    model = ReferenceEvaluator(onnx.load_from_string(default.load(f"{networks.OpenPoseMobileNet.name}.onnx")))
     blob = cv2.dnn.blobFromImage(net_input.pixels, swapRB=True)
     expected = model.run(None, {model.input_names[0]: blob})[0][0]
     assert expected.max() > 0.5
@@ -90,9 +88,9 @@ def test_its_maps_are_those_of_the_reference_implementation(photograph):
 
 @pytest.mark.parametrize("position", [0, 1000, -1])
 def test_a_damaged_weight_is_refused(tmp_path, monkeypatch, position):
-    path = tmp_path / "weights" / f"{mobilenet.OpenPoseMobileNet.name}.onnx"
+    path = tmp_path / "weights" / f"{networks.OpenPoseMobileNet.name}.onnx"
     path.parent.mkdir()
-    content = bytearray(default.load(f"{mobilenet.OpenPoseMobileNet.name}.onnx"))
+    content = bytearray(default.load(f"{networks.OpenPoseMobileNet.name}.onnx"))
     content[position] ^= 1
     path.write_bytes(content)
     shutil.copy(default.REGISTRY_PATH, tmp_path / "detectors.json")

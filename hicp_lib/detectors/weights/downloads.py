@@ -1,5 +1,10 @@
-"""Download one file from a web address, whole or not at all, with limits on time."""
+"""Downloads, with limits on time: wheels from the package index, and single files from web addresses.
 
+Wheels come through pip, which checks their hashes; nothing in them is executed. A file is whole or not used.
+"""
+
+import subprocess
+import sys
 import time
 from functools import partial
 from http.client import HTTPException
@@ -9,7 +14,59 @@ from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import Request, build_opener
 
+from hicp_lib.core.children import child_environment
 from hicp_lib.core.errors import one_line
+
+# pip has a timeout for silent servers, but none for one that keeps sending single bytes.
+PIP_TIMEOUT_S = 3600.0
+
+
+def run_pip(*arguments: str) -> str | None:
+    """Run a pip command on wheels that a requirements file names with their hashes.
+
+    pip's own configuration (index, proxy, certificates) applies.
+
+    Parameters
+    ----------
+    *arguments : str
+        The command and its arguments.
+
+    Returns
+    -------
+    str or None
+        None when it succeeded, otherwise one line saying what went wrong.
+    """
+    command = [sys.executable, "-m", "pip", *arguments, "--quiet", "--no-input", "--no-deps"]
+    command += ["--only-binary", ":all:", "--require-hashes"]
+    environment = child_environment(PIP_DISABLE_PIP_VERSION_CHECK="1", PIP_USER="0")
+    try:
+        run = subprocess.run(
+            command,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=PIP_TIMEOUT_S,
+        )
+    except subprocess.TimeoutExpired:
+        return f"it was not done within {PIP_TIMEOUT_S:g} s"
+    except OSError as error:
+        return f"Python could not be started: {error.strerror}"
+    return None if run.returncode == 0 else reason(run.stderr) or f"pip ended with code {run.returncode}"
+
+
+def reason(stderr: str) -> str:
+    """The last error pip printed, as one line.
+
+    Examples
+    --------
+    >>> reason("WARNING: slow\\nERROR: No matching distribution found for net==1.0\\n")
+    'No matching distribution found for net==1.0'
+    """
+    lines = [line.strip() for line in stderr.splitlines() if line.strip()]
+    errors = [line.removeprefix("ERROR:").strip() for line in lines if line.upper().startswith("ERROR")]
+    return (errors or lines or [""])[-1]
+
 
 # Timeout of a silent server, and minimum speed from then on.
 TIMEOUT_S, LEAST_BYTES_PER_S = 30.0, 5000

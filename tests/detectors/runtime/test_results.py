@@ -9,7 +9,7 @@ from hicp_lib.core.images import read_image, write_png
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.detectors.combined.detector import Combined
 from hicp_lib.detectors.registry import make_detector
-from hicp_lib.detectors.runtime import cached_parts, run
+from hicp_lib.detectors.runtime import results, run
 from hicp_lib.detectors.runtime.results import _modules, cache_folder
 
 PART_S, OWN_S, START_S = 0.03, 0.005, 1.0
@@ -88,7 +88,7 @@ def detectors(tmp_path, monkeypatch):
     monkeypatch.setenv("HICP_CACHE", str(tmp_path / "cache"))
     made = Detectors()
     monkeypatch.setattr(run, "make_detector", made.make)
-    monkeypatch.setattr(cached_parts, "time", made.clock)
+    monkeypatch.setattr(results, "time", made.clock)
     return made
 
 
@@ -143,8 +143,8 @@ def test_a_variant_of_a_combination_takes_what_it_would_take_alone(detectors, im
     first = run.detect_images("combined", images, workers=1, looks=looks)
     again = run.detect_images("combined", images, workers=1, looks=looks, arbitrate=False)
     n_looks = detectors.n_seen("hands") + detectors.n_seen("body")
-    for results in (first, again):
-        total_ms = sum(result.time_ms for result in results.values())
+    for found in (first, again):
+        total_ms = sum(result.time_ms for result in found.values())
         assert total_ms == pytest.approx(1e3 * PART_S * n_looks, abs=1e-2)
 
 
@@ -166,7 +166,7 @@ def test_without_a_file_nothing_is_kept(detectors, images):
     for name in ("both", "combined"):
         detectors.make(name).detect(image)
         begin_s = detectors.clock.now_s
-        took_ms = cached_parts.Runner(detectors.make(name), workers=1).detect(image, None, None).time_ms
+        took_ms = results.Runner(detectors.make(name), workers=1).detect(image, None, None).time_ms
         assert took_ms == pytest.approx(1e3 * (detectors.clock.now_s - begin_s - 2 * START_S), abs=1e-3)
     assert detectors.n_seen("body") == 4
     assert not (cache_dir() / "detections").exists()
@@ -194,7 +194,7 @@ def test_the_detector_that_a_runner_is_given_stays_as_it_is(detectors):
     given = detectors.make("combined:both+hands")
     body, hands = given.parts["body"], given.parts["hands"]
     inner = dict(body.parts)
-    runner = cached_parts.Runner(given, workers=1)
+    runner = results.Runner(given, workers=1)
     assert runner.detector is given
     assert given.parts == {"body": body, "hands": hands} and body.parts == inner
 
@@ -204,5 +204,5 @@ def test_the_key_of_a_combination_names_the_code_of_its_parts(weights):
     assert set(_modules(combined)) == {
         "hicp_lib.detectors.combined.detector",
         "hicp_lib.detectors.mediapipe.tasks",
-        "hicp_lib.detectors.openpose.mobilenet",
+        "hicp_lib.detectors.openpose.networks",
     }

@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hicp_lib.detectors.onnx.affine import Regions
+from hicp_lib.detectors.onnx.fitting import Regions
 
 BOX = st.tuples(*[st.floats(-500, 2000)] * 2, *[st.floats(1, 3000)] * 2)
 SIZE = st.sampled_from([(192, 256), (288, 384), (256, 256), (160, 128)])

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.detectors.onnx.box_source import BoxSource
-from hicp_lib.detectors.onnx.nanodet import NanoDet
+from hicp_lib.detectors.onnx.box_source import BoxSource, NanoDet
 from hicp_lib.detectors.registry import make_detector
 from tests.detectors.plain_people import render_person
 
@@ -46,7 +45,7 @@ def test_thresholds():
 
 
 def test_it_is_what_detects_when_no_other_is_named():
-    source = BoxSource("detected", None, "cpu", 1)
+    source = BoxSource(boxes="detected")
     image, _ = render_person(0)
     np.testing.assert_array_equal(source.find(image, None)[0], NanoDet().find(image)[0])
     assert "NanoDet-g" in [fact.value for fact in source.describe()]
@@ -55,4 +54,4 @@ def test_it_is_what_detects_when_no_other_is_named():
     )
     assert finder["person_model"]["min_score"] == 0.3 and "person_model" not in whole
     with pytest.raises(InputError, match="boxes 'image': do not use a person model"):
-        BoxSource("image", "yolox.onnx", "cpu", 1)
+        BoxSource(boxes="image", person_model="yolox.onnx")

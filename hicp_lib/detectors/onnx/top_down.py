@@ -1,22 +1,23 @@
-"""A top-down network: crops of people in, keypoints in the image out.
+"""Top-down detectors: boxes, then a network that takes crops of people and gives their keypoints.
 
 The size of the input, the number of keypoints, and whether outputs are heat maps or SimCC are read from the
 file; the rest (colours, decoding) has to be given. Metadata (`input_w`, `input_h`, `split_ratio`, alone or in
 a `cigpose_meta`) are used, and must agree with the network.
 """
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Unpack
 
 import numpy as np
 
+from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import mirror
-from hicp_lib.detectors.onnx.affine import PADDING, Regions
+from hicp_lib.detectors.onnx.box_source import BoxOptions, BoxSource
 from hicp_lib.detectors.onnx.decode import Decoded, decode_simcc
-from hicp_lib.detectors.onnx.facts import Fact, facts
-from hicp_lib.detectors.onnx.letterbox import blob
-from hicp_lib.detectors.onnx.session import OnnxModel
+from hicp_lib.detectors.onnx.fitting import PADDING, Regions, blob
+from hicp_lib.detectors.onnx.session import Fact, OnnxModel, facts, open_model
 
 CONVENTIONS = {14: "crowdpose14", 17: "coco17", 21: "right_hand21", 26: "halpe26", 68: "halpe68_noface"}
 CONVENTIONS |= {133: "wholebody133", 136: "halpe136"}
@@ -24,24 +25,42 @@ CONVENTIONS |= {133: "wholebody133", 136: "halpe136"}
 _STRANGERS = {15: "MPI's body", 16: "MPII's body", 98: "WFLW's face", 106: "LaPa's face", 308: "Goliath"}
 _MAX_BATCH = 16
 Colour = tuple[float, float, float]
-Decoder = Callable[[np.ndarray], Decoded]
 
 
-class PoseNet:
-    """A top-down network, with the properties that its file does not state.
-
-    Parameters
-    ----------
-    model : OnnxModel
-    mean, std : Colour
-        Of the R, G and B values 0-255: subtracted, and divided by.
-    flip_test : bool
-        Also run the mirrored crops, and average.
-    input_size_px : list of int, optional
-        Width and height of the crops, if neither the file's input nor its metadata states them.
+class TopDownOptions(BoxOptions, total=False):
+    """Options of every top-down network.
 
     Attributes
     ----------
+    flip_test : bool
+        Also run the mirrored crops, and average; by default not.
+    input_size_px : list of int or None
+        Width and height of the crops, if neither the file's input nor its metadata states them.
+    """
+
+    flip_test: bool
+    input_size_px: list | None
+
+
+class TopDown:
+    """A detector that runs a network on each person's box; a subclass says how it decodes, and what remains.
+
+    Parameters
+    ----------
+    model : str or Path
+        ONNX export.
+    mean, std : Colour
+        Of the R, G and B values 0-255: subtracted, and divided by.
+    flip_test : bool
+    input_size_px : list of int, optional
+    **person_boxes : object
+        See `TopDownOptions`.
+
+    Attributes
+    ----------
+    takes_boxes : bool
+    settings : dict
+        As of every detector.
     input_size_px : tuple of int
         Width and height of the crops.
     convention : str
@@ -54,6 +73,8 @@ class PoseNet:
         Crops per run; None if the file leaves it open.
     grid_size : tuple of int
         Width and height of the grid that the outputs' positions are on.
+    udp : bool
+        Whether the network was trained with unbiased data processing.
 
     Raises
     ------
@@ -61,58 +82,73 @@ class PoseNet:
         If the file's input or outputs are not those of a top-down pose network.
     """
 
+    udp = False
+
     def __init__(
-        self,
-        model: OnnxModel,
-        mean: Colour,
-        std: Colour,
-        flip_test: bool,
-        input_size_px: list[int] | None = None,
-    ) -> None:
-        self.model, self._mean, self._std, self._flip_test = model, mean, std, flip_test
-        self.batch = model.inputs[0].shape[0] if model.inputs[0].shape else None
-        self.input_size_px, self._size_from = _input_size(model, input_size_px)
-        answer = model.response_to_zeros(*self.input_size_px[::-1])
+        self, model: str | Path, mean: Colour, std: Colour, flip_test: bool = False,
+        input_size_px: list | None = None, **person_boxes: Unpack[BoxOptions],
+    ) -> None:  # fmt: skip
+        self._boxes = BoxSource(**person_boxes)
+        self.takes_boxes = self._boxes.kind == "gt"
+        self.model = opened = open_model(model, **self._boxes.run)
+        self._mean, self._std, self._flip_test = mean, std, flip_test
+        self.batch = opened.inputs[0].shape[0] if opened.inputs[0].shape else None
+        self.input_size_px, self._size_from = _input_size(opened, input_size_px)
+        answer = opened.response_to_zeros(*self.input_size_px[::-1])
         self.answer = outputs = self._ordered(answer)
         self.is_simcc = len(outputs) == 2
-        self.convention = convention_of(model, outputs[0].shape[1], answer)
+        self.convention = convention_of(opened, outputs[0].shape[1], answer)
         self._mirror = mirror(self.convention)
         first, last = outputs[0], outputs[-1]
         self.grid_size = (first.shape[-1], last.shape[-1] if self.is_simcc else last.shape[-2])
-        ratio = model.told.metadata.get("split_ratio")
+        ratio = opened.told.metadata.get("split_ratio")
         if self.is_simcc and ratio and self.grid_size != tuple(side * ratio for side in self.input_size_px):
             size = "{} x {}".format(*self.input_size_px)
-            raise model.refusal(f"its metadata say {ratio} bins per pixel of its {size}", answer)
+            raise opened.refusal(f"its metadata say {ratio} bins per pixel of its {size}", answer)
+        self.settings = {"model": opened.settings, "flip_test": flip_test} | self._boxes.settings
 
-    def find(self, image: np.ndarray, regions: Regions, decode_maps: Decoder) -> Decoded:
-        """Keypoints of the people in some regions of an RGB image.
+    def _decode_maps(self, maps: np.ndarray) -> Decoded:
+        """Heat maps, shape (n, k, h, w), to positions in cells, shape (n, k, 2), and scores, shape (n, k)."""
+        raise NotImplementedError
+
+    def _people(
+        self, found: Decoded, box_scores: np.ndarray, boxes: np.ndarray, regions: Regions
+    ) -> Detections:
+        """The people that remain of n poses.
 
         Parameters
         ----------
-        image : array, shape (height, width, 3), dtype uint8
+        found : tuple of array, shapes (n, k, 2) and (n, k)
+            Positions in the image, NaN where the score is not positive, and scores as the network gives them.
+        box_scores : array, shape (n,)
+        boxes : array, shape (n, 4: x, y, width, height)
         regions : Regions
-        decode_maps : callable
-            Heat maps, shape (n, k, h, w), to positions in cells, shape (n, k, 2), and scores, shape (n, k).
-
-        Returns
-        -------
-        positions_px : array, shape (n, k, 2)
-            In the image; NaN where the score is not positive.
-        scores : array, shape (n, k)
+            What the network saw of each.
         """
-        outputs = self._respond(regions.crop(image, self.input_size_px), regions.udp)
-        cells, scores = decode_simcc(*outputs) if self.is_simcc else decode_maps(outputs[0])
-        return regions.to_image_px(cells, self.grid_size), scores
+        raise NotImplementedError
 
-    def describe(self) -> list[Fact]:
-        """What the file tells, and how crops are made."""
+    def detect(self, image: np.ndarray, boxes_px: np.ndarray | None = None) -> Detections:
+        """Find people in an RGB image, shape (height, width, 3), uint8.
+
+        `boxes_px`, shape (n, 4: x, y, width, height), are used when boxes are "gt".
+        """
+        boxes, box_scores = self._boxes.find(image, boxes_px)
+        if not len(boxes):
+            return Detections.none()
+        regions = Regions.around(boxes, self.input_size_px, udp=self.udp)
+        outputs = self._respond(regions.crop(image, self.input_size_px))
+        cells, scores = decode_simcc(*outputs) if self.is_simcc else self._decode_maps(outputs[0])
+        return self._people((regions.to_image_px(cells, self.grid_size), scores), box_scores, boxes, regions)
+
+    def described(self, own: list[Fact]) -> list[Fact]:
+        """What the file tells and how crops are made, what a subclass assumes, and where boxes come from."""
         size = {"size_px": self.input_size_px, "size_from": self._size_from, "batch": self.batch or "any"}
         grid = "x".join(map(str, self.grid_size)) + (" bins" if self.is_simcc else " cells")
         output = {"grid": grid, "convention": self.convention, "padding": PADDING}
-        own = facts("top-down", flip_test="yes" if self._flip_test else "no", **size, **output)
-        return [*self.model.describe(), *own]
+        crops = facts("top-down", flip_test="yes" if self._flip_test else "no", **size, **output)
+        return [*self.model.describe(), *crops, *own, *self._boxes.describe()]
 
-    def _respond(self, crops: list[np.ndarray], udp: bool) -> list[np.ndarray]:
+    def _respond(self, crops: list[np.ndarray]) -> list[np.ndarray]:
         """The outputs for n crops, including the flip test."""
         n = len(crops)
         if self._flip_test:
@@ -122,7 +158,7 @@ class PoseNet:
         outputs = [np.concatenate(part) for part in zip(*parts, strict=True)]
         if not self._flip_test:
             return outputs
-        shifts = not (self.is_simcc or udp)
+        shifts = not (self.is_simcc or self.udp)
         return [self._average(out[:n], out[n:], axis, shifts) for axis, out in enumerate(outputs)]
 
     def _run(self, crops: list[np.ndarray]) -> list[np.ndarray]:
