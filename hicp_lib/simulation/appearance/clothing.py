@@ -49,6 +49,9 @@ class Garment:
     smoothing: int = 10
 
 
+_EVEN_STEPS = 4  # of smoothing, after which seams along hems are even
+
+
 @dataclass(frozen=True)
 class Pattern:
     """A cut-out garment with n vertices, ready to be put on.
@@ -57,7 +60,7 @@ class Pattern:
     ----------
     cut : g.Cut
     smoothing : array, shape (n, n)
-        Moves each vertex most of the way to the mean of its neighbours.
+        See `g.smoothing`.
     distance : array, shape (n,)
         How far inside the garment's edge each vertex is, in its field's units.
     rim : array of int, shape (n_edges, 2)
@@ -88,10 +91,14 @@ def _cut_pattern(kind: str, start: float, end: float, sleeve: float, opening: fl
         field = _bottom_field(body, start, end)
     cut = g.cut(body.triangles, field)
     deep = field > 0.03
+    smoothing = g.smoothing(cut.triangles, len(cut.i))
+    distance = np.maximum(cut.apply(field.astype(np.float32)), 0)
+    for _ in range(_EVEN_STEPS):
+        distance = smoothing @ distance
     return Pattern(
         cut=cut,
-        smoothing=g.smoothing(cut.triangles, len(cut.i)),
-        distance=np.maximum(cut.apply(field.astype(np.float32)), 0),
+        smoothing=smoothing,
+        distance=distance,
         rim=g.boundary_edges(cut.triangles),
         hidden=deep[body.triangles].all(axis=1),
     )
