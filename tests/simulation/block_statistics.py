@@ -144,8 +144,7 @@ def hair_grown() -> list[np.ndarray]:
         hair_styles.Style(0.3, 0.3, tie="bun", n_locks=200),
         hair_styles.Style(0.07, 0.05, coil_m=0.007, n_locks=300),
     ]
-    head = hair.obstacles(BODY, rest, landmarks)
-    grown = [hair.grow(style, BODY, rest, head, rng) for style, rng in zip(styles, rngs(4), strict=True)]
+    grown = [hair.grow(style, BODY, rest, landmarks, rng) for style, rng in zip(styles, rngs(4), strict=True)]
     carried = hair.carry(grown[0], BODY, posed, heads, landmarks)
     return [*map(mesh, grown), mesh(carried), looks(hair.hair_material(np.array([0.2, 0.1, 0.05])), 4)]
 
@@ -159,7 +158,7 @@ def garments() -> list[np.ndarray]:
     top = clothing.Garment("top", -0.1, 1.03, 0.55, 0.07)
     worn = [clothing.put_on(garment, posed, rest, folds, layers) for garment in (bottom, top)]
     strip = clothing.collar(top, worn[1][0], posed, 0.022, 0.02)
-    skirt = clothing.skirt(posed, posed.rotations[BODY.bone_numbers["root"]], 0.5, 0.3, 1.0)
+    skirt = clothing.skirt(posed, layers, posed.rotations[BODY.bone_numbers["root"]], 0.5, 0.3, 1.0)
     hidden = np.array([[clothing.cut_pattern(garment).hidden.sum()] for garment in (bottom, top)])
     return [*(mesh(m) for m, _ in worn), mesh(strip), mesh(skirt), layers[:, None], folds, hidden]
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
+from scipy.ndimage import map_coordinates
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.core.memo import memoised
@@ -49,6 +50,9 @@ class Garment:
     smoothing: int = 10
 
 
+_CHEST = 0.8  # in the `torso` field: from there cloth hangs
+_LOOSE_M = 0.014  # ease of a garment that hangs straight down
+_MOST_AWAY_M = 0.06  # of hanging cloth from the body
 _EVEN_STEPS = 4  # of smoothing, after which seams along hems are even
 
 
@@ -156,6 +160,8 @@ def put_on(
     for _ in range(garment.smoothing):
         smooth = pattern.smoothing @ smooth
     smooth, laid = smooth[:, :3], smooth[:, 3:]
+    if garment.kind == "top":
+        smooth = _hang(garment, pattern, smooth, skin + below[:, None] * skin_normals, posed)
     cloth = _drape(garment, pattern, smooth, skin, skin_normals, rest, folds, below)
     height = np.einsum("ij,ij->i", cloth - skin, skin_normals)
     for corners in (cut.i, cut.j):  # a cut edge lies between two of the body's vertices
@@ -180,6 +186,36 @@ def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, 
     cloth = cloth + (heights * np.minimum(away / 0.01, 1.5))[:, None] * skin_normals
     away = np.maximum(0.6 * away, below + 0.003 * (below > 0))
     return _keep_away(pattern.smoothing @ cloth.astype(np.float32), skin, skin_normals, away)
+
+
+def _hang(garment: Garment, pattern: Pattern, cloth: np.ndarray, body: np.ndarray, posed) -> np.ndarray:
+    """The trunk's cloth falls from chest and shoulder blades, the further from the body the looser it is."""
+    arm, torso = (pattern.cut.apply(load_body().field(name)) for name in ("arm", "torso"))
+    rows = np.flatnonzero((arm == 0) & (torso < _CHEST))
+    R = posed.rotations[load_body().bone_numbers["spine03"]].astype(np.float32)
+    origin = posed.keypoints_m[INDEX["mid_hip"]]
+    local, solid = (cloth[rows] - origin) @ R, (body[rows] - origin) @ R
+    heights = np.linspace(solid[:, 2].max(), solid[:, 2].min(), 16)
+    outline = np.maximum.accumulate(_outline(solid, heights, 32), axis=0).astype(np.float32)
+    radius = np.hypot(local[:, 0], local[:, 1])
+    row = (local[:, 2] - heights[0]) / (heights[1] - heights[0])
+    column = np.arctan2(local[:, 1], local[:, 0]) * (32 / (2 * np.pi))
+    found = map_coordinates(np.pad(outline, ((0, 0), (0, 1)), "wrap"), [row, column % 32], order=1, mode="nearest")
+    share = np.clip(garment.ease_m / _LOOSE_M, 0.5, 1) * np.clip((_CHEST - torso[rows]) / 0.15, 0, 1)
+    out = share * np.clip(found - radius, 0, _MOST_AWAY_M) / radius
+    cloth = cloth.copy()
+    cloth[rows] += (local * [1, 1, 0] * out[:, None]) @ R.T
+    return cloth
+
+
+def _outline(points: np.ndarray, heights: np.ndarray, n_angles: int) -> np.ndarray:
+    """Radii (n_heights, n_angles) of the convex outline of points at heights, about their z axis."""
+    angle = np.linspace(0, 2 * np.pi, n_angles, endpoint=False)
+    ray, radius = np.stack([np.cos(angle), np.sin(angle)]), np.zeros((len(heights), n_angles))
+    for row, height in enumerate(heights):
+        near = points[np.abs(points[:, 2] - height) < 0.05, :2]
+        radius[row] = (near @ ray).max(axis=0) if len(near) > 8 else radius[row - 1]
+    return radius
 
 
 def _keep_away(cloth: np.ndarray, skin: np.ndarray, normals: np.ndarray, away: np.ndarray) -> np.ndarray:
@@ -252,12 +288,20 @@ def collar(garment: Garment, mesh: g.Mesh, posed: PosedBody, rise_m: float, open
     return g.Mesh(vertices, triangles, g.vertex_normals(vertices, triangles), coords)
 
 
-def skirt(posed: PosedBody, hip_rotation: np.ndarray, length_m: float, flare: float, phase: float) -> g.Mesh:
+WAIST_M = 0.14
+"""Height of a skirt's waist above the hips."""
+
+
+def skirt(
+    posed: PosedBody, layers_m: np.ndarray, hip_rotation: np.ndarray, length_m: float, flare: float, phase: float
+) -> g.Mesh:
     """A skirt around hips and legs: their outline at each height below the waist, folded towards the hem.
 
     Parameters
     ----------
     posed : PosedBody
+    layers_m : array, shape (n_v,)
+        Distance from the skin of the clothes tucked into it.
     hip_rotation : array, shape (3, 3)
         Of the pelvis, from rest to pose.
     length_m : float
@@ -273,17 +317,14 @@ def skirt(posed: PosedBody, hip_rotation: np.ndarray, length_m: float, flare: fl
     """
     body = load_body()
     legs = (body.field("leg") > 0) | body.in_regions("hips")
-    legs |= body.in_regions("torso") & (body.field("torso") < 0.22) & (body.field("arm") == 0)
-    hips = posed.keypoints_m[INDEX["mid_hip"]]
-    points = (posed.vertices_m[legs] - hips) @ hip_rotation  # x forward, y left, z up, in every pose
+    legs |= body.in_regions("torso") & (body.field("torso") < 0.32) & (body.field("arm") == 0)
+    hips, worn = posed.keypoints_m[INDEX["mid_hip"]], posed.normals[legs] * layers_m[legs, None]
+    points = (posed.vertices_m[legs] + worn - hips) @ hip_rotation  # x forward, y left, z up, in every pose
     n_angles, n_rows = 72, 16
     angle = np.linspace(0, 2 * np.pi, n_angles, endpoint=False)
     ray = np.stack([np.cos(angle), np.sin(angle)])
-    heights = np.linspace(0.14, -length_m, n_rows)
-    radius = np.empty((n_rows, n_angles))
-    for row, height in enumerate(heights):
-        near = points[np.abs(points[:, 2] - height) < 0.05, :2]
-        radius[row] = (near @ ray).max(axis=0) if len(near) > 8 else radius[row - 1]
+    heights = np.linspace(WAIST_M, -length_m, n_rows)
+    radius = _outline(points, heights, n_angles)
     below = np.linspace(0, 1, n_rows)[:, None]
     radius = np.maximum.accumulate(radius * 0.97, axis=0) * (1 + flare * below**1.3) + 0.008
     folds = below * 0.016 * np.sin(9 * angle + phase + 2 * below)

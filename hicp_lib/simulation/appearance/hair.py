@@ -7,8 +7,8 @@ head and, further down, by the back.
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
+from scipy.spatial import KDTree
 
 from hicp_lib.simulation.appearance.hair_styles import Style
 from hicp_lib.simulation.body.model import Body, PosedBody
@@ -20,121 +20,43 @@ Rng = np.random.Generator
 
 
 @dataclass(frozen=True)
-class Obstacles:
-    """Surfaces that hair lies on, at rest, body frame.
+class _Below:
+    """The n vertices of head and trunk that hair lies on, at rest, body frame.
 
-    Attributes
-    ----------
-    centre_m : array, shape (3,)
-        Middle of the head.
-    radius_m : array, shape (36, 72)
-        Of head and neck by direction from there: rows of elevation, columns of azimuth.
-    corner_m : array, shape (2,)
-        Where the trunk's grid over y and z begins; its cells are `_CELL_M` wide.
-    back_m, front_m : array, shape (rows, columns)
-        The trunk's extent along x in each cell.
+    `cloth_m` is the thickness of clothes there, `is_scalp` tells where short hair clings.
     """
 
-    centre_m: np.ndarray
-    radius_m: np.ndarray
-    corner_m: np.ndarray
-    back_m: np.ndarray
-    front_m: np.ndarray
+    vertices_m: np.ndarray
+    normals: np.ndarray
+    cloth_m: np.ndarray
+    is_scalp: np.ndarray
+    tree: KDTree
 
 
-_GRID = (36, 72)
-_CELL_M = 0.02
 _CLOTH_M = 0.018
-_FAR_M = 9.0  # for a column without trunk
 
 
-def obstacles(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> Obstacles:
-    """Head, neck and trunk of a body at rest.
-
-    Parameters
-    ----------
-    body : Body
-    rest_m : array, shape (n_v, 3)
-        The person at rest, body frame.
-    landmarks_m : array, shape (136, 3)
-        The person's keypoints at rest.
-
-    Returns
-    -------
-    Obstacles
-    """
-    ears, top = landmarks_m[3:5].mean(axis=0), landmarks_m[17]
-    centre = np.array([ears[0] + 0.005, 0.0, 0.5 * (ears[2] + top[2]) - 0.015])
-    trunk = body.in_regions("hips", "torso") & (rest_m[:, 2] > centre[2] - 0.75)
-    head = rest_m[body.in_regions("face", "scalp", "neck", "eyebrow")]
-    return Obstacles(centre, _radii(head - centre), *_columns(rest_m[trunk]))
+def _below_hair(body: Body, rest_m: np.ndarray, normals: np.ndarray) -> _Below:
+    trunk = body.in_regions("hips", "torso")
+    kept = body.in_regions("face", "scalp", "neck", "eyebrow") & (body.field("ear") < 0.3) | trunk
+    vertices, is_scalp = rest_m[kept], body.field("hairline_m")[kept] > -0.01
+    # Hair slides off shoulders to the front or the back, not to the side.
+    sideless = normals * [1, 0.2, 0.5] + np.where(normals[:, :1] < 0, -0.7, 0.7) * [1, 0, 0]
+    normals = np.where(trunk[:, None], g.unit(sideless), normals)
+    return _Below(vertices, normals[kept], _CLOTH_M * trunk[kept], is_scalp, KDTree(vertices))
 
 
-def _radii(offset: np.ndarray) -> np.ndarray:
-    row, column = (x.astype(int) for x in _place(offset))
-    radius = np.zeros(_GRID)
-    cells = np.clip(row, 0, _GRID[0] - 1), column % _GRID[1]
-    np.maximum.at(radius, cells, np.linalg.norm(offset, axis=1))
-    while not radius.all():  # directions without a vertex take their neighbours' values
-        padded = np.pad(radius, ((1, 1), (0, 0)), mode="edge")
-        around = [np.roll(radius, s, axis=1) for s in (-1, 1)] + [padded[2:], padded[:-2]]
-        radius = np.where(radius == 0, np.max(around, axis=0), radius)
-    padded = np.pad(np.pad(radius, ((2, 2), (0, 0)), mode="edge"), ((0, 0), (6, 6)), mode="wrap")
-    return np.maximum(cv2.GaussianBlur(padded, (0, 0), 0.8)[2:-2, 6:-6], radius * 0.98)
+def _lay(below: _Below, points: np.ndarray, layer_m: np.ndarray, lift: float) -> np.ndarray:
+    """Push points out of head and trunk; those above the scalp sink towards it, the less the hair's lift."""
+    _, nearest = below.tree.query(points)
+    normals, least_m = below.normals[nearest], layer_m + below.cloth_m[nearest]
+    height_m = np.einsum("ij,ij->i", points - below.vertices_m[nearest], normals)
+    sinking = np.where(below.is_scalp[nearest], min(2 * lift + 0.2, 1.0), 1.0)
+    excess = height_m - least_m
+    return points + (np.where(excess > 0, sinking * excess, 0) - excess)[:, None] * normals
 
 
-def _columns(trunk_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    corner = trunk_m[:, 1:].min(axis=0)
-    cells = ((trunk_m[:, 1:] - corner) / _CELL_M).astype(int)
-    shape = tuple(cells.max(axis=0) + 1)
-    back, front = np.full(shape, _FAR_M), np.full(shape, -_FAR_M)
-    np.minimum.at(back, tuple(cells.T), trunk_m[:, 0])
-    np.maximum.at(front, tuple(cells.T), trunk_m[:, 0])
-    kernel = np.ones((3, 3))
-    return corner, cv2.erode(back, kernel), cv2.dilate(front, kernel)
-
-
-def _place(offset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Row and column in the grid of directions, fractional."""
-    rise = np.arctan2(offset[..., 2], np.hypot(offset[..., 0], offset[..., 1]))
-    azimuth = np.arctan2(offset[..., 1], offset[..., 0])
-    return (rise / np.pi + 0.5) * _GRID[0], (azimuth / (2 * np.pi) + 0.5) * _GRID[1]
-
-
-def _radius(head: Obstacles, offset: np.ndarray) -> np.ndarray:
-    """Bilinear between the middles of cells."""
-    row, column = _place(offset)
-    row, column = np.clip(row - 0.5, 0, _GRID[0] - 1.001), np.mod(column - 0.5, _GRID[1])
-    r, c = row.astype(int), column.astype(int)
-    fr, fc, right = row - r, column - c, (c + 1) % _GRID[1]
-    c = c % _GRID[1]
-    radius = head.radius_m
-    low = radius[r, c] * (1 - fc) + radius[r, right] * fc
-    high = radius[r + 1, c] * (1 - fc) + radius[r + 1, right] * fc
-    return low * (1 - fr) + high * fr
-
-
-def _keep_off(head: Obstacles, points: np.ndarray, layer: np.ndarray) -> np.ndarray:
-    """Push points out of the head, away from its centre, and out of the trunk, to its front or back."""
-    offset = points - head.centre_m
-    distance = np.linalg.norm(offset, axis=1)
-    wanted = _radius(head, offset) + layer
-    scale = np.where(distance < wanted, wanted / np.maximum(distance, 1e-3), 1)
-    points = head.centre_m + offset * scale[:, None]
-    cell = ((points[:, 1:] - head.corner_m) / _CELL_M).astype(int)
-    shape = head.back_m.shape
-    within = ((cell >= 0) & (cell < shape)).all(axis=1)
-    cell = np.clip(cell, 0, np.array(shape) - 1)
-    row, column = cell.T
-    back = head.back_m[row, column] - _CLOTH_M - layer
-    front = head.front_m[row, column] + _CLOTH_M + layer
-    x = points[:, 0]
-    inside = within & (x > back) & (x < front)
-    points[:, 0] = np.where(inside, np.where(x < 0.45 * back + 0.55 * front, back, front), x)
-    return points
-
-
-def grow(style: Style, body: Body, rest_m: np.ndarray, head: Obstacles, rng: Rng) -> g.Mesh:
+def grow(style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, rng: Rng) -> g.Mesh:
     """Hair on the body at rest.
 
     Parameters
@@ -143,8 +65,8 @@ def grow(style: Style, body: Body, rest_m: np.ndarray, head: Obstacles, rng: Rng
     body : Body
     rest_m : array, shape (n_v, 3)
         The person at rest, body frame.
-    head : Obstacles
-        The person's.
+    landmarks_m : array, shape (136, 3)
+        The person's keypoints at rest.
     rng : numpy.random.Generator
 
     Returns
@@ -152,15 +74,18 @@ def grow(style: Style, body: Body, rest_m: np.ndarray, head: Obstacles, rng: Rng
     g.Mesh
         Its coords: across a lock (-1 to 1), metres along it, a random number per lock, root 0 to tip 1.
     """
-    roots, normals, inside = _roots(style, body, rest_m, rng)
-    points, reach = _strands(style, head, roots, normals, inside, rng)
+    skin_normals = g.vertex_normals(rest_m.astype(np.float32), body.triangles)
+    ears, top = landmarks_m[3:5].mean(axis=0), landmarks_m[17]
+    centre = np.array([ears[0] + 0.005, 0.0, 0.5 * (ears[2] + top[2]) - 0.015])  # of the head
+    below = _below_hair(body, rest_m, skin_normals)
+    points, reach = _strands(style, centre, below, *_roots(style, body, rest_m, skin_normals, rng), rng)
     if style.tie:
-        tied, tied_reach = _tail(style, head, rng)
+        tied, tied_reach = _tail(style, centre, rng)
         points, reach = np.concatenate([points, tied]), np.concatenate([reach, tied_reach])
-    return _ribbons(style, head, points, reach, rng)
+    return _ribbons(style, centre, points, reach, rng)
 
 
-def _roots(style: Style, body: Body, rest_m: np.ndarray, rng: Rng):
+def _roots(style: Style, body: Body, rest_m: np.ndarray, skin_normals: np.ndarray, rng: Rng):
     field = body.field("hairline_m")
     triangles = body.triangles[(field[body.triangles] > -0.004).all(axis=1)]
     corners = rest_m[triangles]
@@ -169,22 +94,22 @@ def _roots(style: Style, body: Body, rest_m: np.ndarray, rng: Rng):
     a, b = np.sqrt(rng.random(len(rows))), rng.random(len(rows))
     weights = np.stack([1 - a, a * (1 - b), a * b], axis=1)
     roots = np.einsum("nk,nkj->nj", weights, corners[rows])
-    normals = g.vertex_normals(rest_m.astype(np.float32), triangles)[triangles[rows]]
+    normals = skin_normals[triangles[rows]]
     inside = np.einsum("nk,nk->n", weights, field[triangles[rows]])
     return roots, g.unit(np.einsum("nk,nkj->nj", weights, normals)), inside
 
 
-def _strands(style: Style, head: Obstacles, roots, normals, inside, rng) -> tuple[np.ndarray, np.ndarray]:
+def _strands(style: Style, centre: np.ndarray, below: _Below, roots, normals, inside, rng) -> tuple[np.ndarray, np.ndarray]:
     """Points along the locks, (n, n_steps + 1, 3), and each lock's length."""
     n = len(roots)
-    relative = roots - head.centre_m
+    relative = roots - centre
     crown = np.clip((relative[:, 2] + 0.02) / 0.09, 0, 1)
     length = style.side_m + (style.top_m - style.side_m) * crown
     length = length * rng.uniform(0.85, 1.05, n) * np.clip(0.35 + inside / 0.012, 0.35, 1)
     layer = style.volume_m * rng.random(n) * np.clip(inside / 0.02, 0.1, 1) + 0.001
     if style.tie:
-        length = 1.25 * np.linalg.norm(_tie_point(style, head) - roots, axis=1)
-    comb = _combing(style, head, roots, normals)
+        length = 1.25 * np.linalg.norm(_tie_point(style, centre) - roots, axis=1)
+    comb = _combing(style, centre, roots, normals)
     wave = _smooth_random(rng, roots)
     direction = g.unit(style.lift * normals + (1 - style.lift) * comb + 0.04 * rng.normal(0, 1, (n, 3)))
     step = (length / style.n_steps)[:, None]
@@ -195,11 +120,11 @@ def _strands(style: Style, head: Obstacles, roots, normals, inside, rng) -> tupl
         direction = g.unit(direction + 0.6 * comb + np.array([0, 0, -style.gravity]) + wander)
         here = points[-1]
         if style.tie:
-            left = _tie_point(style, head) - here
+            left = _tie_point(style, centre) - here
             comb, step = g.unit(left), np.minimum(step, np.linalg.norm(left, axis=1)[:, None])
         else:
             comb = comb * 0.7
-        points.append(_keep_off(head, here + step * direction, layer))
+        points.append(_lay(below, here + step * direction, layer, style.lift))
         direction = g.unit(points[-1] - here)
     return _coil(style, np.stack(points, axis=1), rng), length
 
@@ -224,28 +149,28 @@ def _smooth_random(rng: Rng, roots: np.ndarray) -> np.ndarray:
     return np.sin(np.einsum("nj,kwj->nkw", roots, waves) + phase).mean(axis=2)
 
 
-def _tie_point(style: Style, head: Obstacles) -> np.ndarray:
+def _tie_point(style: Style, centre: np.ndarray) -> np.ndarray:
     height = 0.03 if style.tie == "tail" else 0.0
-    return head.centre_m + np.array([-0.105, 0, height])
+    return centre + np.array([-0.105, 0, height])
 
 
-def _combing(style: Style, head: Obstacles, roots, normals) -> np.ndarray:
+def _combing(style: Style, centre: np.ndarray, roots, normals) -> np.ndarray:
     if style.tie:
-        comb = _tie_point(style, head) - roots
+        comb = _tie_point(style, centre) - roots
     else:
         comb = np.tile(np.array(style.comb, float), (len(roots), 1))
         side = np.where(roots[:, 1] > 0.02 * style.parting, 1.0, -1.0)
         comb[:, 1] += 0.45 * side * (style.parting != 0)
-        front = np.clip((roots[:, 0] - head.centre_m[0]) / 0.08, 0, 1)
+        front = np.clip((roots[:, 0] - centre[0]) / 0.08, 0, 1)
         comb[:, 0] -= 0.5 * front * (style.top_m > 0.1)  # long hair leaves the face free
     comb = comb - np.einsum("ij,ij->i", comb, normals)[:, None] * normals
     return g.unit(comb)
 
 
-def _tail(style: Style, head: Obstacles, rng: Rng) -> tuple[np.ndarray, np.ndarray]:
+def _tail(style: Style, centre: np.ndarray, rng: Rng) -> tuple[np.ndarray, np.ndarray]:
     """Locks of a ponytail or a bun, from the point where the hair is tied."""
     n = 260
-    origin = _tie_point(style, head)
+    origin = _tie_point(style, centre)
     steps = np.arange(style.n_steps + 1) / style.n_steps
     if style.tie == "tail":
         length = rng.uniform(0.2, 0.32) * rng.uniform(0.7, 1.05, n)
@@ -267,11 +192,11 @@ def _tail(style: Style, head: Obstacles, rng: Rng) -> tuple[np.ndarray, np.ndarr
     return origin + np.array([-0.018, 0, 0]) + ring * scale, np.full(n, 0.08)
 
 
-def _ribbons(style: Style, head: Obstacles, points: np.ndarray, length: np.ndarray, rng) -> g.Mesh:
+def _ribbons(style: Style, centre: np.ndarray, points: np.ndarray, length: np.ndarray, rng) -> g.Mesh:
     n, k, _ = points.shape
     along = np.gradient(points, axis=1)
-    outward = g.unit(points - head.centre_m)
-    low = points[..., 2] < head.centre_m[2] - 0.12
+    outward = g.unit(points - centre)
+    low = points[..., 2] < centre[2] - 0.12
     outward[low, 2] = 0
     outward = g.unit(outward)
     side = g.unit(np.cross(along, outward))
@@ -288,7 +213,7 @@ def _ribbons(style: Style, head: Obstacles, points: np.ndarray, length: np.ndarr
     coords[..., 1] = (t * length[:, None])[..., None]
     coords[..., 2] = rng.random(n)[:, None, None]
     coords[..., 3] = t[:, None]
-    strip = g.grid_triangles(k, 2)
+    strip = g.grid_triangles(k, 2)[:, ::-1]  # which face outwards, as the normals do
     triangles = (np.arange(n)[:, None, None] * (2 * k) + strip).reshape(-1, 3).astype(np.int32)
     flat = [x.reshape(-1, x.shape[-1]).astype(np.float32) for x in (vertices, normals, coords)]
     return g.Mesh(flat[0], triangles, flat[1], flat[2])

@@ -101,6 +101,7 @@ def appearance_of(identity: Identity, skirts: bool = True) -> Appearance:
     return Appearance(identity.body, complexion, style, worn, skirt, shoes, int(rng.integers(2**31)))
 
 
+_TUCKED = 0.14  # where tops end that are tucked into a skirt, below its waist
 _TRIMS = {"polo": fabrics.Trim(0.025, 0.9), "shirt": fabrics.Trim(0.02, 1.0, "buttons")}
 
 
@@ -111,7 +112,8 @@ def _outfit(rng: Rng, woman: bool, skirts: bool) -> tuple[list[Worn], Skirt | No
         return [top, _bottom(rng, str(rng.choice(list(PEOPLE["bottoms"]), p=odds)))], None
     fabric = top.fabric if rng.random() < 0.4 else fabrics.random_fabric(rng, 0.6)
     skirt = (rng.uniform(0.38, 0.75), rng.uniform(0.05, 0.5), rng.uniform(0, 6), fabric)
-    return [top, _bottom(rng, "leggings")] if rng.random() < 0.4 else [top], skirt
+    tucked = replace(top, garment=replace(top.garment, start=_TUCKED))
+    return [tucked, _bottom(rng, "leggings")] if rng.random() < 0.4 else [tucked], skirt
 
 
 def _top(rng: Rng, kind: str, woman: bool) -> Worn:
@@ -152,21 +154,21 @@ def part_of_vertices(body: Body) -> np.ndarray:
 
 
 @memoised(64)
-def _measured(shape: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, fabrics.Panels, hair.Obstacles]:
-    """Of a shape at rest: vertices, bone heads, keypoints, panels of cloth, surfaces below hair."""
+def _measured(shape: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, fabrics.Panels]:
+    """Of a shape at rest: vertices, bone heads, keypoints, panels of cloth."""
     body = load_body()
     rest, heads = rest_shape(body, shape)
     landmarks = body.keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
-    return rest, heads, landmarks, fabrics.make_panels(landmarks), hair.obstacles(body, rest, landmarks)
+    return rest, heads, landmarks, fabrics.make_panels(landmarks)
 
 
 @memoised(4)  # for people who are seen in many frames
 def _fit(appearance: Appearance) -> tuple[np.ndarray, g.Mesh | None]:
     """What is the same for a person in all poses: paint, and hair at rest."""
     body = load_body()
-    rest, _, landmarks, _, head = _measured(appearance.shape)
+    rest, _, landmarks, _ = _measured(appearance.shape)
     paint, rng = skin.paint_coords(body, rest, landmarks), np.random.default_rng(appearance.seed)
-    return paint, hair.grow(appearance.style, body, rest, head, rng) if appearance.style else None
+    return paint, hair.grow(appearance.style, body, rest, landmarks, rng) if appearance.style else None
 
 
 @memoised()
@@ -198,7 +200,7 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
         In the frame of the posed person.
     """
     body, (paint, grown) = load_body(), _fit(appearance)
-    rest, heads, landmarks, panels, _ = _measured(appearance.shape)
+    rest, heads, landmarks, panels = _measured(appearance.shape)
     part = part_of_vertices(body)[body.triangles[:, 0]]
     mouth, feet = _always_hidden()
     surfaces, hidden = [], mouth.copy()
@@ -214,7 +216,7 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
             material = fabrics.cloth_material(worn.fabric, panels, "arms", fabrics.Trim(0.0))
             surfaces.append(_of_region("neck", strip, material, person))
     if appearance.skirt is not None:
-        surfaces.append(_skirt(appearance.skirt, body, posed, panels, person))
+        surfaces.append(_skirt(appearance.skirt, body, posed, layers, panels, person))
     if appearance.shoes is not None:
         hidden |= feet
         surfaces.append(_shoes(appearance.shoes, posed, person))
@@ -235,10 +237,10 @@ def _skin(appearance: Appearance, posed: PosedBody, paint, shown, part, person: 
     return Surface(mesh, skin.skin_material(appearance.complexion, covered), person, part[shown])
 
 
-def _skirt(skirt: Skirt, body: Body, posed: PosedBody, panels: fabrics.Panels, person: int) -> Surface:
+def _skirt(skirt: Skirt, body: Body, posed: PosedBody, layers, panels: fabrics.Panels, person: int) -> Surface:
     hips = posed.rotations[body.bone_numbers["root"]]
     *cut, fabric = skirt
-    mesh = clothing.skirt(posed, hips, *cut)
+    mesh = clothing.skirt(posed, layers, hips, *cut)
     material = fabrics.cloth_material(fabric, panels, "", fabrics.Trim(0.02, 0.95))
     return _of_region("hips", mesh, material, person)
 
