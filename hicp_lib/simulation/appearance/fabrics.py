@@ -19,6 +19,7 @@ the front."""
 
 _PANEL_ENDS = (("mid_hip", "neck"), ("left_shoulder", "left_wrist"), ("right_shoulder", "right_wrist"),
                ("left_hip", "left_ankle"), ("right_hip", "right_ankle"))  # fmt: skip
+_BACK_M = 3.0  # where the trunk's back is on its panel: prints are on the chest only
 _PANEL_RADII_M = np.array([0.15, 0.06, 0.06, 0.085, 0.085], np.float32)  # assumed radii of limbs
 
 
@@ -67,6 +68,7 @@ def panel_coordinates(panels: Panels, coords: np.ndarray, limbs: str) -> tuple[n
         if number == 0 and limbs:  # two flat panels, front and back, that bend round the sides
             x, y = local[0], local[1]
             around = y + np.sign(y) * np.maximum(0.04 - np.abs(x), 0)
+            around = np.where(x < 0, _BACK_M - around, around)
         uv[0, rows], uv[1, rows] = around, along
     return uv, panel
 

@@ -157,7 +157,7 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
         c = dict(zip(COORDS, coords, strict=True))
         uv = np.stack([c["y"] + 0.5 * c["x"], c["z"] + 0.3 * c["x"]])
         blotches, pores, freckles = textures.sample(textures.skin, uv, footprint_m)
-        flush = np.clip(c["flush"] * (1 + 0.25 * blotches) + 0.07 * blotches, -0.2, 1)
+        flush = np.clip(c["flush"] * (0.8 + 0.1 * blotches) + 0.04 * blotches, -0.2, 1)
         flush *= 1 - 0.4 * complexion.tone
         albedo = column(tone) + (column(red) - column(tone)) * flush
         albedo *= 1 + 0.02 * blotches + 0.025 * pores
@@ -177,7 +177,7 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
             gloss[eye], roughness[eye], softness[eye] = 0.06, 0.16, 0.3
         inside = c["mouth"] > 0.7
         albedo[:, inside] = column([0.12, 0.03, 0.03])
-        return Look(albedo, 0.00009 * pores, gloss, roughness, softness)
+        return Look(albedo, 0.00005 * pores, gloss, roughness, softness)
 
     return look
 
