@@ -169,7 +169,8 @@ def put_on(
     normals = g.vertex_normals(cloth, cut.triangles)
     fields = (cut.apply(body.field(name)) for name in ("arm", "leg", "torso"))
     coords = np.column_stack([laid, *fields, pattern.distance])
-    return _with_rim(pattern, g.Mesh(cloth, cut.triangles, normals, coords.astype(np.float32)), skin)
+    inner = cloth - (height + 0.004)[:, None] * skin_normals  # into the skin, without a gap
+    return _with_rim(pattern, g.Mesh(cloth, cut.triangles, normals, coords.astype(np.float32)), inner)
 
 
 def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, folds, below) -> np.ndarray:
@@ -178,8 +179,8 @@ def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, 
     ends = pattern.distance if garment.kind == "top" else garment.start - leg
     away = garment.thickness_m + garment.ease_m * np.exp(-ends / 0.25).astype(float)
     torso = pattern.cut.apply(body.field("torso"))
-    if garment.kind == "bottom":  # a waistband is tight
-        away = np.where(torso > 0, np.minimum(away, garment.thickness_m), away)
+    if garment.kind == "bottom":  # a waistband is tight, legs are wider below
+        away = np.where(torso > 0, garment.thickness_m, away + garment.ease_m * leg)
     away = np.maximum(away, below + 0.004 * (below > 0))
     cloth = _keep_away(cloth, skin, skin_normals, away)
     heights = sum(h * np.sin(rest @ np.array([x, y, z], np.float32) + p) for x, y, z, p, h in folds)
@@ -223,19 +224,20 @@ def _keep_away(cloth: np.ndarray, skin: np.ndarray, normals: np.ndarray, away: n
     return (cloth + np.maximum(away - distance, 0)[:, None] * normals).astype(np.float32)
 
 
-def _with_rim(pattern: Pattern, mesh: g.Mesh, skin: np.ndarray) -> tuple[g.Mesh, np.ndarray]:
+def _with_rim(pattern: Pattern, mesh: g.Mesh, inner_m: np.ndarray) -> tuple[g.Mesh, np.ndarray]:
     """Turn the cloth's edge inwards, so that hems, cuffs and collars show their thickness."""
     a, b = pattern.rim.T
     used, place = np.unique(np.concatenate([a, b]), return_inverse=True)
     inner = place.reshape(2, -1) + len(mesh.vertices_m)
     strip = np.concatenate([np.stack([b, a, inner[0]], axis=1), np.stack([b, inner[0], inner[1]], axis=1)])
-    vertices = np.concatenate([mesh.vertices_m, 0.75 * skin[used] + 0.25 * mesh.vertices_m[used]])
+    vertices = np.concatenate([mesh.vertices_m, inner_m[used]]).astype(np.float32)
+    inner_normals = g.vertex_normals(vertices, strip)[len(mesh.vertices_m) :]
     owner = np.full(len(mesh.vertices_m), -1)
     owner[mesh.triangles.T.ravel()] = np.tile(pattern.cut.source, 3)
     return g.Mesh(
-        vertices.astype(np.float32),
+        vertices,
         np.concatenate([mesh.triangles, strip]).astype(np.int32),
-        np.concatenate([mesh.normals, mesh.normals[used]]),
+        np.concatenate([mesh.normals, inner_normals]),
         np.concatenate([mesh.coords, mesh.coords[used]]),
     ), np.concatenate([pattern.cut.source, np.tile(owner[a], 2)])
 
