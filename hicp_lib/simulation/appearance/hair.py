@@ -5,55 +5,20 @@ rounded bundle of strands. They grow on the body at rest and are then carried al
 head and, further down, by the back.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from hicp_lib.simulation.appearance.hair_styles import Style
+from hicp_lib.simulation.body.identities import PEOPLE, Rng
 from hicp_lib.simulation.body.model import Body, PosedBody
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering import textures
 from hicp_lib.simulation.rendering.surfaces import Look, Material, column
 
-Rng = np.random.Generator
-
-
-@dataclass(frozen=True)
-class _Below:
-    """The n vertices of head and trunk that hair lies on, at rest, body frame.
-
-    `cloth_m` is the thickness of clothes there, `is_scalp` tells where short hair clings.
-    """
-
-    vertices_m: np.ndarray
-    normals: np.ndarray
-    cloth_m: np.ndarray
-    is_scalp: np.ndarray
-    tree: KDTree
-
-
-_CLOTH_M = 0.018
-
-
-def _below_hair(body: Body, rest_m: np.ndarray, normals: np.ndarray) -> _Below:
-    trunk = body.in_regions("hips", "torso")
-    kept = body.in_regions("face", "scalp", "neck", "eyebrow") & (body.field("ear") < 0.3) | trunk
-    vertices, is_scalp = rest_m[kept], body.field("hairline_m")[kept] > -0.01
-    # Hair slides off shoulders to the front or the back, not to the side.
-    sideless = normals * [1, 0.2, 0.5] + np.where(normals[:, :1] < 0, -0.7, 0.7) * [1, 0, 0]
-    normals = np.where(trunk[:, None], g.unit(sideless), normals)
-    return _Below(vertices, normals[kept], _CLOTH_M * trunk[kept], is_scalp, KDTree(vertices))
-
-
-def _lay(below: _Below, points: np.ndarray, layer_m: np.ndarray, lift: float) -> np.ndarray:
-    """Push points out of head and trunk; those above the scalp sink towards it, the less the hair's lift."""
-    _, nearest = below.tree.query(points)
-    normals, least_m = below.normals[nearest], layer_m + below.cloth_m[nearest]
-    height_m = np.einsum("ij,ij->i", points - below.vertices_m[nearest], normals)
-    sinking = np.where(below.is_scalp[nearest], min(2 * lift + 0.2, 1.0), 1.0)
-    excess = height_m - least_m
-    return points + (np.where(excess > 0, sinking * excess, 0) - excess)[:, None] * normals
+_CLOTH_M = 0.018  # of clothes below hair
+Lay = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
 
 
 def grow(style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, rng: Rng) -> g.Mesh:
@@ -77,12 +42,38 @@ def grow(style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, 
     skin_normals = g.vertex_normals(rest_m.astype(np.float32), body.triangles)
     ears, top = landmarks_m[3:5].mean(axis=0), landmarks_m[17]
     centre = np.array([ears[0] + 0.005, 0.0, 0.5 * (ears[2] + top[2]) - 0.015])  # of the head
-    below = _below_hair(body, rest_m, skin_normals)
-    points, reach = _strands(style, centre, below, *_roots(style, body, rest_m, skin_normals, rng), rng)
-    if style.tie:
-        tied, tied_reach = _tail(style, centre, rng)
+    lay = _laying(body, rest_m, skin_normals)
+    points, reach = _strands(style, centre, lay, *_roots(style, body, rest_m, skin_normals, rng), rng=rng)
+    if style.tie:  # beyond the knot, hair grows from there
+        loose, knot = Style(**PEOPLE["tied_hair"][style.tie]), _tie_point(style, centre)
+        roots = knot + rng.normal(0, 0.008, (loose.n_locks, 3))
+        backward, inside = np.tile([-1.0, 0, 0], (loose.n_locks, 1)), np.ones(loose.n_locks)
+        tied, tied_reach = _strands(loose, centre, lay, roots, backward, inside, rng=rng)
         points, reach = np.concatenate([points, tied]), np.concatenate([reach, tied_reach])
     return _ribbons(style, centre, points, reach, rng)
+
+
+def _laying(body: Body, rest_m: np.ndarray, normals: np.ndarray) -> Lay:
+    """What pushes points (n, 3) out of head and trunk, to a layer (n,) above them.
+
+    Points above the scalp sink towards it, the less lift the hair has.
+    """
+    trunk = body.in_regions("hips", "torso")
+    kept = body.in_regions("face", "scalp", "neck", "eyebrow") & (body.field("ear") < 0.3) | trunk
+    surface, cloth_m, on_scalp = rest_m[kept], _CLOTH_M * trunk[kept], body.field("hairline_m")[kept] > -0.01
+    # Hair slides off shoulders to the front or the back, not to the side.
+    sideless = normals * [1, 0.2, 0.5] + np.where(normals[:, :1] < 0, -0.7, 0.7) * [1, 0, 0]
+    away = np.where(trunk[:, None], g.unit(sideless), normals)[kept]
+    tree = KDTree(surface)
+
+    def lay(points: np.ndarray, layer_m: np.ndarray, lift: float) -> np.ndarray:
+        _, nearest = tree.query(points)
+        height_m = np.einsum("ij,ij->i", points - surface[nearest], away[nearest])
+        excess_m = height_m - layer_m - cloth_m[nearest]
+        sunk = np.where(on_scalp[nearest], min(2 * lift + 0.2, 1.0), 1.0) * np.maximum(excess_m, 0)
+        return points + (sunk - excess_m)[:, None] * away[nearest]
+
+    return lay
 
 
 def _roots(style: Style, body: Body, rest_m: np.ndarray, skin_normals: np.ndarray, rng: Rng):
@@ -99,7 +90,7 @@ def _roots(style: Style, body: Body, rest_m: np.ndarray, skin_normals: np.ndarra
     return roots, g.unit(np.einsum("nk,nkj->nj", weights, normals)), inside
 
 
-def _strands(style: Style, centre: np.ndarray, below: _Below, roots, normals, inside, rng) -> tuple[np.ndarray, np.ndarray]:
+def _strands(style: Style, centre: np.ndarray, lay: Lay, roots, normals, inside, rng: Rng):
     """Points along the locks, (n, n_steps + 1, 3), and each lock's length."""
     n = len(roots)
     relative = roots - centre
@@ -124,7 +115,7 @@ def _strands(style: Style, centre: np.ndarray, below: _Below, roots, normals, in
             comb, step = g.unit(left), np.minimum(step, np.linalg.norm(left, axis=1)[:, None])
         else:
             comb = comb * 0.7
-        points.append(_lay(below, here + step * direction, layer, style.lift))
+        points.append(lay(here + step * direction, layer, style.lift))
         direction = g.unit(points[-1] - here)
     return _coil(style, np.stack(points, axis=1), rng), length
 
@@ -167,38 +158,11 @@ def _combing(style: Style, centre: np.ndarray, roots, normals) -> np.ndarray:
     return g.unit(comb)
 
 
-def _tail(style: Style, centre: np.ndarray, rng: Rng) -> tuple[np.ndarray, np.ndarray]:
-    """Locks of a ponytail or a bun, from the point where the hair is tied."""
-    n = 260
-    origin = _tie_point(style, centre)
-    steps = np.arange(style.n_steps + 1) / style.n_steps
-    if style.tie == "tail":
-        length = rng.uniform(0.2, 0.32) * rng.uniform(0.7, 1.05, n)
-        spread = rng.normal(0, 1, (n, 2)) * 0.012
-        t = steps[None] * length[:, None]
-        back = 0.05 * np.sin(np.minimum(steps * 4, np.pi / 2)) + 0.02
-        swell = 0.4 + 1.3 * np.sin(np.pi * np.minimum(steps * 1.1, 1))
-        x = -back[None] - spread[:, :1] * swell
-        y = spread[:, 1:] * swell + rng.normal(0, 0.002, (n, len(steps)))
-        z = 0.03 * np.sin(np.minimum(steps * 5, np.pi)) - t
-        return origin + np.stack([np.broadcast_to(x, t.shape), y, z], axis=-1), length
-    radius = 0.034
-    axis = g.unit(rng.normal(0, 1, (n, 3)) * [1, 0.5, 0.5])
-    start = g.unit(np.cross(axis, rng.normal(0, 1, (n, 3))))
-    other = np.cross(axis, start)
-    angle = steps[None, :, None] * 2.6
-    ring = np.cos(angle) * start[:, None] + np.sin(angle) * other[:, None]
-    scale = radius * rng.uniform(0.75, 1.05, (n, 1, 1)) * np.array([0.8, 1, 1])
-    return origin + np.array([-0.018, 0, 0]) + ring * scale, np.full(n, 0.08)
-
-
 def _ribbons(style: Style, centre: np.ndarray, points: np.ndarray, length: np.ndarray, rng) -> g.Mesh:
     n, k, _ = points.shape
     along = np.gradient(points, axis=1)
-    outward = g.unit(points - centre)
-    low = points[..., 2] < centre[2] - 0.12
-    outward[low, 2] = 0
-    outward = g.unit(outward)
+    outward = points - centre
+    outward[..., 2] *= outward[..., 2] > -0.12  # below the head: from a vertical
     side = g.unit(np.cross(along, outward))
     outward = g.unit(np.cross(side, along))
     twist = rng.normal(0, 0.12, (n, 1, 1))
