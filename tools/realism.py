@@ -56,7 +56,8 @@ def compare(before: Path, after: Path) -> pd.DataFrame:
         subset, detector, _ = case
         earlier, draws = was[case]
         change = difference(its, earlier, samples, draws)["AP"]
-        rows.append((subset, detector, photographed[subset, detector], earlier.AP, its.AP, *change, its.n_people))
+        known = photographed[subset, detector]
+        rows.append((subset, detector, known, earlier.AP, its.AP, *change, its.n_people))
     columns = "subset detector photographs before after change low high n_people".split()
     return pd.DataFrame(rows, columns=columns)
 

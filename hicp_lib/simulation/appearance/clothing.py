@@ -52,6 +52,7 @@ class Garment:
 
 _CHEST = 0.8  # in the `torso` field: from there cloth hangs
 _LOOSE_M = 0.014  # ease of a garment that hangs straight down
+_N_ANGLES = 32  # of its outline
 _MOST_AWAY_M = 0.06  # of hanging cloth from the body
 _EVEN_STEPS = 4  # of smoothing, after which seams along hems are even
 
@@ -189,24 +190,25 @@ def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, 
     return _keep_away(pattern.smoothing @ cloth.astype(np.float32), skin, skin_normals, away)
 
 
-def _hang(garment: Garment, pattern: Pattern, cloth: np.ndarray, body: np.ndarray, posed) -> np.ndarray:
+def _hang(garment: Garment, pattern: Pattern, cloth: np.ndarray, solid: np.ndarray, posed) -> np.ndarray:
     """The trunk's cloth falls from chest and shoulder blades, the further from the body the looser it is."""
-    arm, torso = (pattern.cut.apply(load_body().field(name)) for name in ("arm", "torso"))
+    body, cut = load_body(), pattern.cut
+    arm, torso = (cut.apply(body.field(name)) for name in ("arm", "torso"))
     rows = np.flatnonzero((arm == 0) & (torso < _CHEST))
-    R = posed.rotations[load_body().bone_numbers["spine03"]].astype(np.float32)
-    origin = posed.keypoints_m[INDEX["mid_hip"]]
-    local, solid = (cloth[rows] - origin) @ R, (body[rows] - origin) @ R
-    heights = np.linspace(solid[:, 2].max(), solid[:, 2].min(), 16)
-    outline = np.maximum.accumulate(_outline(solid, heights, 32), axis=0).astype(np.float32)
-    radius = np.hypot(local[:, 0], local[:, 1])
-    row = (local[:, 2] - heights[0]) / (heights[1] - heights[0])
-    column = np.arctan2(local[:, 1], local[:, 0]) * (32 / (2 * np.pi))
-    found = map_coordinates(np.pad(outline, ((0, 0), (0, 1)), "wrap"), [row, column % 32], order=1, mode="nearest")
+    R = posed.rotations[body.bone_numbers["spine03"]].astype(np.float32)
+    local, within = ((points[rows] - posed.keypoints_m[INDEX["mid_hip"]]) @ R for points in (cloth, solid))
+    x, y, z = local.T
+    heights = np.linspace(within[:, 2].max(), within[:, 2].min(), 16)
+    outline = np.maximum.accumulate(_outline(within, heights, _N_ANGLES), axis=0)
+    row = (z - heights[0]) / (heights[1] - heights[0])
+    column = np.mod(np.arctan2(y, x) * (_N_ANGLES / (2 * np.pi)), _N_ANGLES)
+    around = np.pad(outline, ((0, 0), (0, 1)), "wrap")
+    gap = map_coordinates(around, [row, column], order=1, mode="nearest") - np.hypot(x, y)
     share = np.clip(garment.ease_m / _LOOSE_M, 0.5, 1) * np.clip((_CHEST - torso[rows]) / 0.15, 0, 1)
-    out = share * np.clip(found - radius, 0, _MOST_AWAY_M) / radius
-    cloth = cloth.copy()
-    cloth[rows] += (local * [1, 1, 0] * out[:, None]) @ R.T
-    return cloth
+    away = share * np.clip(gap, 0, _MOST_AWAY_M) / np.hypot(x, y)
+    hanging = cloth.copy()
+    hanging[rows] += np.column_stack([away * x, away * y, 0 * z]).astype(np.float32) @ R.T
+    return hanging
 
 
 def _outline(points: np.ndarray, heights: np.ndarray, n_angles: int) -> np.ndarray:
@@ -294,9 +296,7 @@ WAIST_M = 0.14
 """Height of a skirt's waist above the hips."""
 
 
-def skirt(
-    posed: PosedBody, layers_m: np.ndarray, hip_rotation: np.ndarray, length_m: float, flare: float, phase: float
-) -> g.Mesh:
+def skirt(posed: PosedBody, layers_m: np.ndarray, length_m: float, flare: float, phase: float) -> g.Mesh:
     """A skirt around hips and legs: their outline at each height below the waist, folded towards the hem.
 
     Parameters
@@ -304,8 +304,6 @@ def skirt(
     posed : PosedBody
     layers_m : array, shape (n_v,)
         Distance from the skin of the clothes tucked into it.
-    hip_rotation : array, shape (3, 3)
-        Of the pelvis, from rest to pose.
     length_m : float
     flare : float
         How much wider than the legs the hem is, as a share.
@@ -320,8 +318,9 @@ def skirt(
     body = load_body()
     legs = (body.field("leg") > 0) | body.in_regions("hips")
     legs |= body.in_regions("torso") & (body.field("torso") < 0.32) & (body.field("arm") == 0)
-    hips, worn = posed.keypoints_m[INDEX["mid_hip"]], posed.normals[legs] * layers_m[legs, None]
-    points = (posed.vertices_m[legs] + worn - hips) @ hip_rotation  # x forward, y left, z up, in every pose
+    hips, R = posed.keypoints_m[INDEX["mid_hip"]], posed.rotations[body.bone_numbers["root"]]
+    worn = posed.vertices_m[legs] + posed.normals[legs] * layers_m[legs, None]
+    points = (worn - hips) @ R  # x forward, y left, z up, in every pose
     n_angles, n_rows = 72, 16
     angle = np.linspace(0, 2 * np.pi, n_angles, endpoint=False)
     ray = np.stack([np.cos(angle), np.sin(angle)])
@@ -334,7 +333,7 @@ def skirt(
     radius = (radius + np.roll(radius, 1, 1) + np.roll(radius, -1, 1)) / 3
     local = np.stack(np.broadcast_arrays(radius * ray[0], radius * ray[1], heights[:, None]), axis=-1)
     grid = np.concatenate([local, local[:, :1]], axis=1)
-    vertices = (grid.reshape(-1, 3) @ hip_rotation.T + hips).astype(np.float32)
+    vertices = (grid.reshape(-1, 3) @ R.T + hips).astype(np.float32)
     rest = np.stack([0.2 * np.cos(angle), 0.2 * np.sin(angle)], axis=1)
     rest = np.concatenate([rest, rest[:1]])
     coords = np.zeros((n_rows, n_angles + 1, 7), np.float32)

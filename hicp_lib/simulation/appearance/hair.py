@@ -43,12 +43,12 @@ def grow(style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, 
     ears, top = landmarks_m[3:5].mean(axis=0), landmarks_m[17]
     centre = np.array([ears[0] + 0.005, 0.0, 0.5 * (ears[2] + top[2]) - 0.015])  # of the head
     lay = _laying(body, rest_m, skin_normals)
-    points, reach = _strands(style, centre, lay, *_roots(style, body, rest_m, skin_normals, rng), rng=rng)
+    points, reach = _strands(style, centre, lay, rng, *_roots(style, body, rest_m, skin_normals, rng))
     if style.tie:  # beyond the knot, hair grows from there
         loose, knot = Style(**PEOPLE["tied_hair"][style.tie]), _tie_point(style, centre)
         roots = knot + rng.normal(0, 0.008, (loose.n_locks, 3))
         backward, inside = np.tile([-1.0, 0, 0], (loose.n_locks, 1)), np.ones(loose.n_locks)
-        tied, tied_reach = _strands(loose, centre, lay, roots, backward, inside, rng=rng)
+        tied, tied_reach = _strands(loose, centre, lay, rng, roots, backward, inside)
         points, reach = np.concatenate([points, tied]), np.concatenate([reach, tied_reach])
     return _ribbons(style, centre, points, reach, rng)
 
@@ -90,7 +90,7 @@ def _roots(style: Style, body: Body, rest_m: np.ndarray, skin_normals: np.ndarra
     return roots, g.unit(np.einsum("nk,nkj->nj", weights, normals)), inside
 
 
-def _strands(style: Style, centre: np.ndarray, lay: Lay, roots, normals, inside, rng: Rng):
+def _strands(style: Style, centre: np.ndarray, lay: Lay, rng: Rng, roots, normals, inside):
     """Points along the locks, (n, n_steps + 1, 3), and each lock's length."""
     n = len(roots)
     relative = roots - centre

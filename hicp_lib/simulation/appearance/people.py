@@ -216,7 +216,9 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
             material = fabrics.cloth_material(worn.fabric, panels, "arms", fabrics.Trim(0.0))
             surfaces.append(_of_region("neck", strip, material, person))
     if appearance.skirt is not None:
-        surfaces.append(_skirt(appearance.skirt, body, posed, layers, panels, person))
+        *cut, fabric = appearance.skirt
+        material = fabrics.cloth_material(fabric, panels, "", fabrics.Trim(0.02, 0.95))
+        surfaces.append(_of_region("hips", clothing.skirt(posed, layers, *cut), material, person))
     if appearance.shoes is not None:
         hidden |= feet
         surfaces.append(_shoes(appearance.shoes, posed, person))
@@ -235,14 +237,6 @@ def _skin(appearance: Appearance, posed: PosedBody, paint, shown, part, person: 
     covered = appearance.complexion.stubble * 0.3 if appearance.style is None else 1.0
     mesh = g.Mesh(posed.vertices_m, load_body().triangles[shown], posed.normals, paint)
     return Surface(mesh, skin.skin_material(appearance.complexion, covered), person, part[shown])
-
-
-def _skirt(skirt: Skirt, body: Body, posed: PosedBody, layers, panels: fabrics.Panels, person: int) -> Surface:
-    hips = posed.rotations[body.bone_numbers["root"]]
-    *cut, fabric = skirt
-    mesh = clothing.skirt(posed, layers, hips, *cut)
-    material = fabrics.cloth_material(fabric, panels, "", fabrics.Trim(0.02, 0.95))
-    return _of_region("hips", mesh, material, person)
 
 
 def _shoes(shoes: footwear.Shoes, posed: PosedBody, person: int) -> Surface:

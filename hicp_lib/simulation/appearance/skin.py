@@ -201,7 +201,7 @@ def _paint_lips(complexion: Complexion, tone, albedo, roughness, c) -> tuple[np.
     return albedo, roughness - 0.14 * weight
 
 
-def _paint_hair(complexion: Complexion, scalp: float, albedo, c, uv, footprint) -> tuple[np.ndarray, np.ndarray]:
+def _paint_hair(complexion: Complexion, scalp, albedo, c, uv, footprint) -> tuple[np.ndarray, np.ndarray]:
     """Eyebrows, lashes, stubble and the hair's roots; and how much of the skin they leave bare."""
     hair = column(complexion.hair) * 0.7
     slanted = np.stack([uv[0] + uv[1], uv[1] * 2 - uv[0]])
