@@ -181,10 +181,7 @@ def cloths() -> list[np.ndarray]:
         )
         found.append(np.column_stack([look.albedo.T, look.height_m]))
     chest = fabrics.printed(np.random.default_rng(0))(rng.uniform(-0.1, 0.4, (2, 600)), np.full(600, 0.001))
-    numbers = [
-        [*f.colours.ravel(), f.pattern is None, f.weave_m, f.crease_m, f.roughness, f.gloss, f.fuzz]
-        for f in made
-    ]
+    numbers = [[*f.colours.ravel(), f.pattern is None, f.weave_m, f.crease_m, f.fuzz] for f in made]
     return [
         *found,
         chest.T,

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import convolve1d
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.core.memo import memoised
@@ -100,9 +101,7 @@ def _tube(local: np.ndarray, thickness: float) -> np.ndarray:
         near = local[np.abs(local[:, 0] - place) < 0.022, 1:]
         middles[row] = (near.min(axis=0) + near.max(axis=0)) / 2
         rows[row] = ((near - middles[row]) @ ray).max(axis=0)
-    smooth = np.array([0.25, 0.5, 0.25])
-    padded = np.pad(np.column_stack([rows, middles]), ((1, 1), (0, 0)), mode="edge")
-    mixed = smooth[0] * padded[:-2] + smooth[1] * padded[1:-1] + smooth[2] * padded[2:]
+    mixed = convolve1d(np.column_stack([rows, middles]), [0.25, 0.5, 0.25], axis=0, mode="nearest")
     rows, middles = mixed[:, :-2] + thickness, mixed[:, -2:]
     grid = np.concatenate(
         [places[:, None, None] + 0 * rows[..., None], middles[:, None] + rows[..., None] * ray.T], axis=-1

@@ -138,7 +138,7 @@ def _bottom(rng: Rng, kind: str) -> Worn:
     if kind == "leggings":
         end = rng.choice([1.9, 1.5])
         garment = clothing.Garment("bottom", end, waist, thickness_m=0.002, ease_m=0.0, smoothing=2)
-        fabric = replace(fabrics.plain_fabric(rng, dark=True), crease_m=0.0005, gloss=0.03, roughness=0.6)
+        fabric = replace(fabrics.plain_fabric(rng, dark=True), crease_m=0.0005)
         return Worn(garment, fabric, fabrics.Trim(0.0), clothing.random_folds(rng, 0.0))
     end = rng.choice([0.7, 0.85, 0.95]) if kind == "shorts" else rng.choice([1.93, 2.0])
     ease = rng.choice([0.006, 0.012, 0.02])
