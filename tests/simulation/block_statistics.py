@@ -157,10 +157,10 @@ def garments() -> list[np.ndarray]:
     bottom = clothing.Garment("bottom", 1.93, 0.17)
     top = clothing.Garment("top", -0.1, 1.03, 0.55, 0.07)
     worn = [clothing.put_on(garment, posed, rest, folds, layers) for garment in (bottom, top)]
-    strip = clothing.collar(top, worn[1][0], posed, 0.022, 0.02)
+    strip = clothing.collar(top, worn[1], posed, 0.022, 0.02)
     skirt = clothing.skirt(posed, layers, 0.5, 0.3, 1.0)
     hidden = np.array([[clothing.cut_pattern(garment).hidden.sum()] for garment in (bottom, top)])
-    return [*(mesh(m) for m, _ in worn), mesh(strip), mesh(skirt), layers[:, None], folds, hidden]
+    return [*map(mesh, worn), mesh(strip), mesh(skirt), layers[:, None], folds, hidden]
 
 
 def cloths() -> list[np.ndarray]:

@@ -13,7 +13,7 @@ from scipy.ndimage import map_coordinates
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.core.memo import memoised
-from hicp_lib.simulation.body.model import Body, PosedBody, load_body
+from hicp_lib.simulation.body.model import PosedBody, load_body
 from hicp_lib.simulation.rendering import mesh as g
 
 
@@ -66,18 +66,29 @@ class Pattern:
     cut : g.Cut
     smoothing : array, shape (n, n)
         See `g.smoothing`.
-    distance : array, shape (n,)
-        How far inside the garment's edge each vertex is, in its field's units.
+    fields : array, shape (n, 4), dtype float32
+        The body's arm, leg and torso field, and how far inside the garment's edge each vertex is, in its
+        field's units.
     rim : array of int, shape (n_edges, 2)
         The boundary's directed edges.
+    edge : array of int, shape (n_rim,)
+        The boundary's vertices, which are repeated after the n, turned inwards: hems, cuffs and collars show
+        their thickness.
+    triangles : array of int, shape (n_triangles, 3)
+        Of n + n_rim vertices.
+    source : array of int, shape (n_triangles,)
+        Body triangle that each came from.
     hidden : array of bool, shape (n_t,)
         Body triangles well underneath.
     """
 
     cut: g.Cut
     smoothing: sparse.csr_array
-    distance: np.ndarray
+    fields: np.ndarray
     rim: np.ndarray
+    edge: np.ndarray
+    triangles: np.ndarray
+    source: np.ndarray
     hidden: np.ndarray
 
 
@@ -90,47 +101,41 @@ def cut_pattern(garment: Garment) -> Pattern:
 @memoised()
 def _cut_pattern(kind: str, start: float, end: float, sleeve: float, opening: float) -> Pattern:
     body = load_body()
+    arm, leg, torso = (body.field(name).astype(float) for name in ("arm", "leg", "torso"))
     if kind == "top":
-        field = _top_field(body, start, end, sleeve, opening)
+        covered = body.in_regions("hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh")
+        field = _top_field(body.vertices_m[0], arm, torso, start, end, sleeve, opening)
     else:
-        field = _bottom_field(body, start, end)
-    cut = g.cut(body.triangles, field)
-    deep = field > 0.03
-    smoothing = g.smoothing(cut.triangles, len(cut.i))
-    distance = np.maximum(cut.apply(field.astype(np.float32)), 0)
+        covered = body.in_regions("hips", "torso", "thigh", "shin", "foot") & (arm == 0)
+        field = np.minimum(end - torso, start - leg)
+    field = np.where(covered, field, -1)
+    cut, deep = g.cut(body.triangles, field), field > 0.03
+    n, smoothing = len(cut.i), g.smoothing(cut.triangles, len(cut.i))
+    fields = cut.apply(np.column_stack([arm, leg, torso, np.maximum(field, 0)]).astype(np.float32))
     for _ in range(_EVEN_STEPS):
-        distance = smoothing @ distance
-    return Pattern(
-        cut=cut,
-        smoothing=smoothing,
-        distance=distance,
-        rim=g.boundary_edges(cut.triangles),
-        hidden=deep[body.triangles].all(axis=1),
-    )
+        fields[:, 3] = smoothing @ fields[:, 3]
+    rim, owner = g.boundary_edges(cut.triangles), np.empty(n, int)
+    owner[cut.triangles.T.ravel()] = np.tile(cut.source, 3)
+    edge, (a, b) = np.unique(rim), rim.T
+    inner_a, inner_b = np.searchsorted(edge, rim.T) + n
+    strip = np.concatenate([np.stack([b, a, inner_a], axis=1), np.stack([b, inner_a, inner_b], axis=1)])
+    triangles = np.concatenate([cut.triangles, strip]).astype(np.int32)
+    source = np.concatenate([cut.source, np.tile(owner[a], 2)])
+    hidden = deep[body.triangles].all(axis=1)
+    return Pattern(cut, smoothing, fields, rim, edge, triangles, source, hidden)
 
 
-def _top_field(body: Body, start: float, end: float, sleeve: float, opening: float) -> np.ndarray:
-    arm, torso = (body.field(name).astype(float) for name in ("arm", "torso"))
-    rest = body.vertices_m[0]
-    front = np.clip(rest[:, 0] / 0.08, 0, 1) * np.clip(1 - np.abs(rest[:, 1]) / 0.10, 0, 1)
+def _top_field(rest_m: np.ndarray, arm, torso, start: float, end: float, sleeve: float, opening: float):
+    front = np.clip(rest_m[:, 0] / 0.08, 0, 1) * np.clip(1 - np.abs(rest_m[:, 1]) / 0.10, 0, 1)
     trunk = np.minimum(torso - start, end - opening * front.astype(float) - torso)
     on_arm = arm > 0
     trunk = np.where(on_arm, np.maximum(trunk, np.minimum(8 * arm, 0.5)), trunk)
-    field = np.minimum(trunk, np.where(on_arm, sleeve - arm, 9))
-    allowed = body.in_regions("hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh")
-    return np.where(allowed, field, -1)
-
-
-def _bottom_field(body: Body, end: float, waist: float) -> np.ndarray:
-    arm, leg, torso = (body.field(name).astype(float) for name in ("arm", "leg", "torso"))
-    field = np.minimum(waist - torso, end - leg)
-    allowed = body.in_regions("hips", "torso", "thigh", "shin", "foot") & (arm == 0)
-    return np.where(allowed, field, -1)
+    return np.minimum(trunk, np.where(on_arm, sleeve - arm, 9))
 
 
 def put_on(
     garment: Garment, posed: PosedBody, rest_m: np.ndarray, folds: np.ndarray, layers_m: np.ndarray
-) -> tuple[g.Mesh, np.ndarray]:
+) -> g.Mesh:
     """Put a garment on a posed body.
 
     Parameters
@@ -146,13 +151,11 @@ def put_on(
 
     Returns
     -------
-    mesh : g.Mesh
-        Its coords are rest position (3), arm, leg and torso field, distance from the edge.
-    source : array of int, shape (n_triangles,)
-        Body triangle that each of the mesh's triangles came from.
+    g.Mesh
+        Its coords are rest position (3) and the pattern's `fields`.
     """
     pattern = cut_pattern(garment)
-    cut, body = pattern.cut, load_body()
+    cut, edge = pattern.cut, pattern.edge
     skin, skin_normals = cut.apply(posed.vertices_m), g.unit(cut.apply(posed.normals))
     rest = cut.apply(rest_m.astype(np.float32))
     below = cut.apply(layers_m)
@@ -167,19 +170,17 @@ def put_on(
     height = np.einsum("ij,ij->i", cloth - skin, skin_normals)
     for corners in (cut.i, cut.j):  # a cut edge lies between two of the body's vertices
         np.maximum.at(layers_m, corners, height)
-    normals = g.vertex_normals(cloth, cut.triangles)
-    fields = (cut.apply(body.field(name)) for name in ("arm", "leg", "torso"))
-    coords = np.column_stack([laid, *fields, pattern.distance])
     inner = cloth - (height + 0.004)[:, None] * skin_normals  # into the skin, without a gap
-    return _with_rim(pattern, g.Mesh(cloth, cut.triangles, normals, coords.astype(np.float32)), inner)
+    vertices = np.concatenate([cloth, inner[edge]]).astype(np.float32)
+    coords = np.column_stack([laid, pattern.fields]).astype(np.float32)
+    normals = g.vertex_normals(vertices, pattern.triangles)
+    return g.Mesh(vertices, pattern.triangles, normals, np.concatenate([coords, coords[edge]]))
 
 
 def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, folds, below) -> np.ndarray:
-    body = load_body()
-    leg = pattern.cut.apply(body.field("leg")).astype(float)
-    ends = pattern.distance if garment.kind == "top" else garment.start - leg
-    away = garment.thickness_m + garment.ease_m * np.exp(-ends / 0.25).astype(float)
-    torso = pattern.cut.apply(body.field("torso"))
+    _, leg, torso, distance = pattern.fields.T.astype(float)
+    ends = distance if garment.kind == "top" else garment.start - leg
+    away = garment.thickness_m + garment.ease_m * np.exp(-ends / 0.25)
     if garment.kind == "bottom":  # a waistband is tight, legs are wider below
         away = np.where(torso > 0, garment.thickness_m, away + garment.ease_m * leg)
     away = np.maximum(away, below + 0.004 * (below > 0))
@@ -192,10 +193,9 @@ def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, 
 
 def _hang(garment: Garment, pattern: Pattern, cloth: np.ndarray, solid: np.ndarray, posed) -> np.ndarray:
     """The trunk's cloth falls from chest and shoulder blades, the further from the body the looser it is."""
-    body, cut = load_body(), pattern.cut
-    arm, torso = (cut.apply(body.field(name)) for name in ("arm", "torso"))
+    arm, _, torso, _ = pattern.fields.T
     rows = np.flatnonzero((arm == 0) & (torso < _CHEST))
-    R = posed.rotations[body.bone_numbers["spine03"]].astype(np.float32)
+    R = posed.rotations[load_body().bone_numbers["spine03"]].astype(np.float32)
     local, within = ((points[rows] - posed.keypoints_m[INDEX["mid_hip"]]) @ R for points in (cloth, solid))
     x, y, z = local.T
     heights = np.linspace(within[:, 2].max(), within[:, 2].min(), 16)
@@ -224,24 +224,6 @@ def _outline(points: np.ndarray, heights: np.ndarray, n_angles: int) -> np.ndarr
 def _keep_away(cloth: np.ndarray, skin: np.ndarray, normals: np.ndarray, away: np.ndarray) -> np.ndarray:
     distance = np.einsum("ij,ij->i", cloth - skin, normals)
     return (cloth + np.maximum(away - distance, 0)[:, None] * normals).astype(np.float32)
-
-
-def _with_rim(pattern: Pattern, mesh: g.Mesh, inner_m: np.ndarray) -> tuple[g.Mesh, np.ndarray]:
-    """Turn the cloth's edge inwards, so that hems, cuffs and collars show their thickness."""
-    a, b = pattern.rim.T
-    used, place = np.unique(np.concatenate([a, b]), return_inverse=True)
-    inner = place.reshape(2, -1) + len(mesh.vertices_m)
-    strip = np.concatenate([np.stack([b, a, inner[0]], axis=1), np.stack([b, inner[0], inner[1]], axis=1)])
-    vertices = np.concatenate([mesh.vertices_m, inner_m[used]]).astype(np.float32)
-    inner_normals = g.vertex_normals(vertices, strip)[len(mesh.vertices_m) :]
-    owner = np.full(len(mesh.vertices_m), -1)
-    owner[mesh.triangles.T.ravel()] = np.tile(pattern.cut.source, 3)
-    return g.Mesh(
-        vertices,
-        np.concatenate([mesh.triangles, strip]).astype(np.int32),
-        np.concatenate([mesh.normals, inner_normals]),
-        np.concatenate([mesh.coords, mesh.coords[used]]),
-    ), np.concatenate([pattern.cut.source, np.tile(owner[a], 2)])
 
 
 def collar(garment: Garment, mesh: g.Mesh, posed: PosedBody, rise_m: float, open_m: float) -> g.Mesh:

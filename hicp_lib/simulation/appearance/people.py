@@ -206,11 +206,12 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
     surfaces, hidden = [], mouth.copy()
     layers = np.zeros(len(rest), np.float32)
     for worn in sorted(appearance.worn, key=lambda w: w.garment.kind):  # trousers before tops
-        mesh, source = clothing.put_on(worn.garment, posed, rest, worn.folds, layers)
-        hidden |= clothing.cut_pattern(worn.garment).hidden
+        mesh = clothing.put_on(worn.garment, posed, rest, worn.folds, layers)
+        pattern = clothing.cut_pattern(worn.garment)
+        hidden |= pattern.hidden
         limbs = _LIMBS[worn.garment.kind]
         material = fabrics.cloth_material(worn.fabric, panels, limbs, worn.trim)
-        surfaces.append(Surface(mesh, material, person, part[source]))
+        surfaces.append(Surface(mesh, material, person, part[pattern.source]))
         if worn.collar:
             strip = clothing.collar(worn.garment, mesh, posed, 0.022, 0.02)
             material = fabrics.cloth_material(worn.fabric, panels, "arms", fabrics.Trim(0.0))
