@@ -35,7 +35,7 @@ class Garment:
     thickness_m : float
         Everywhere.
     ease_m : float
-        Further distance from the body at hems.
+        Further distance from the body at hems; with more, cloth hangs further off the trunk, and legs are wider.
     smoothing : int
         Steps of smoothing; more bridges wider hollows.
     """
