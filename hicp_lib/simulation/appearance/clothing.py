@@ -270,6 +270,7 @@ def collar(garment: Garment, mesh: g.Mesh, posed: PosedBody, rise_m: float, open
     lows = k * np.arange(len(rows) - 1)[:, None, None, None]
     triangles = (lows + strip).reshape(-1, 3).astype(np.int32)
     coords = np.tile(mesh.coords[:n][used], (len(rows), 1))
+    coords[:, 6] = 1  # without a hem
     coords[:, 2] += np.repeat([0, rise_m, rise_m + 0.01, rise_m + 0.02, 2 * rise_m + 0.02], k)
     return g.Mesh(vertices, triangles, g.vertex_normals(vertices, triangles), coords)
 

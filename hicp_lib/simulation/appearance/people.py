@@ -209,12 +209,10 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
         mesh = clothing.put_on(worn.garment, posed, rest, worn.folds, layers)
         pattern = clothing.cut_pattern(worn.garment)
         hidden |= pattern.hidden
-        limbs = _LIMBS[worn.garment.kind]
-        material = fabrics.cloth_material(worn.fabric, panels, limbs, worn.trim)
+        material = fabrics.cloth_material(worn.fabric, panels, _LIMBS[worn.garment.kind], worn.trim)
         surfaces.append(Surface(mesh, material, person, part[pattern.source]))
         if worn.collar:
             strip = clothing.collar(worn.garment, mesh, posed, 0.022, 0.02)
-            material = fabrics.cloth_material(worn.fabric, panels, "arms", fabrics.Trim(0.0))
             surfaces.append(_of_region("neck", strip, material, person))
     if appearance.skirt is not None:
         *cut, fabric = appearance.skirt
