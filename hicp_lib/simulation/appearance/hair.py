@@ -45,8 +45,8 @@ def grow(style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, 
     lay = _laying(body, rest_m, skin_normals)
     points, reach = _strands(style, centre, lay, rng, *_roots(style, body, rest_m, skin_normals, rng))
     if style.tie:  # beyond the knot, hair grows from there
-        loose, knot = Style(**PEOPLE["tied_hair"][style.tie]), _tie_point(style, centre)
-        roots = knot + rng.normal(0, 0.008, (loose.n_locks, 3))
+        loose = Style(**PEOPLE["tied_hair"][style.tie], n_steps=style.n_steps)
+        roots = _tie_point(style, centre) + rng.normal(0, 0.008, (loose.n_locks, 3))
         backward, inside = np.tile([-1.0, 0, 0], (loose.n_locks, 1)), np.ones(loose.n_locks)
         tied, tied_reach = _strands(loose, centre, lay, rng, roots, backward, inside)
         points, reach = np.concatenate([points, tied]), np.concatenate([reach, tied_reach])
