@@ -35,7 +35,8 @@ class Garment:
     thickness_m : float
         Everywhere.
     ease_m : float
-        Further distance from the body at hems; with more, cloth hangs further off the trunk, and legs are wider.
+        Further distance from the body at hems. The more, the further cloth hangs off the trunk, and the
+        wider legs are.
     smoothing : int
         Steps of smoothing; more bridges wider hollows.
     """
