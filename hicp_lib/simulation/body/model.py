@@ -274,16 +274,13 @@ def rotation_matrices(body: Body, pose: Pose) -> np.ndarray:
     KeyError
         For a bone the model does not have.
     """
-    number, result = body.bone_numbers, np.tile(np.eye(3), (len(body.bone_names), 1, 1))
-    bones, vectors = [], []
+    n = len(body.bone_names)
+    matrices, vectors = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
     for name, turn in pose.items():
-        if np.ndim(turn) == 2:
-            result[number[name]] = turn
-        else:
-            bones.append(number[name])
-            vectors.append(turn)
-    result[bones] = rotations_from_vectors(np.reshape(np.array(vectors, float), (-1, 3)))  # together: faster
-    return result
+        (matrices if np.ndim(turn) == 2 else vectors)[body.bone_numbers[name]] = turn
+    turned = np.flatnonzero(vectors.any(axis=1))
+    matrices[turned] = rotations_from_vectors(vectors[turned])  # all together, which is faster
+    return matrices
 
 
 def rest_shape(body: Body, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
