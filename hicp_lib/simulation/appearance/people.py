@@ -172,12 +172,10 @@ def _fit(appearance: Appearance) -> tuple[np.ndarray, g.Mesh | None]:
 
 
 @memoised()
-def _always_hidden() -> tuple[np.ndarray, np.ndarray]:
-    """Triangles of the body that are never seen: inside the mouth, as lips are closed; inside shoes."""
+def _beyond(field: str, least: float) -> np.ndarray:
+    """Whether all corners of each of the body's triangles lie beyond a value of one of its fields."""
     body = load_body()
-    fields = (("mouth", 0.9), ("leg", 2.06))
-    mouth, feet = ((body.field(name)[body.triangles] > least).all(axis=1) for name, least in fields)
-    return mouth, feet
+    return (body.field(field)[body.triangles] > least).all(axis=1)
 
 
 _LIMBS = {"top": "arms", "bottom": "legs"}
@@ -202,8 +200,7 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
     body, (paint, grown) = load_body(), _fit(appearance)
     rest, heads, landmarks, panels = _measured(appearance.shape)
     part = part_of_vertices(body)[body.triangles[:, 0]]
-    mouth, feet = _always_hidden()
-    surfaces, hidden = [], mouth.copy()
+    surfaces, hidden = [], _beyond("mouth", 0.9).copy()  # lips are closed
     layers = np.zeros(len(rest), np.float32)
     for worn in sorted(appearance.worn, key=lambda w: w.garment.kind):  # trousers before tops
         mesh = clothing.put_on(worn.garment, posed, rest, worn.folds, layers)
@@ -219,7 +216,7 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
         material = fabrics.cloth_material(fabric, panels, "", fabrics.Trim(0.02, 0.95))
         surfaces.append(_of_region("hips", clothing.skirt(posed, layers, *cut), material, person))
     if appearance.shoes is not None:
-        hidden |= feet
+        hidden |= _beyond("leg", 2.06)
         surfaces.append(_shoes(appearance.shoes, posed, person))
     surfaces.insert(0, _skin(appearance, posed, paint, ~hidden, part, person))
     if grown is not None:
