@@ -53,7 +53,6 @@ class Garment:
 
 _CHEST = 0.8  # in the `torso` field: from there cloth hangs
 _LOOSE_M = 0.014  # ease of a garment that hangs straight down
-_N_ANGLES = 32  # of its outline
 _MOST_AWAY_M = 0.06  # of hanging cloth from the body
 _EVEN_STEPS = 4  # of smoothing, after which seams along hems are even
 
@@ -111,7 +110,8 @@ def _cut_pattern(kind: str, start: float, end: float, sleeve: float, opening: fl
         field = np.minimum(end - torso, start - leg)
     field = np.where(covered, field, -1)
     cut, deep = g.cut(body.triangles, field), field > 0.03
-    n, smoothing = len(cut.i), g.smoothing(cut.triangles, len(cut.i))
+    n = len(cut.i)
+    smoothing = g.smoothing(cut.triangles, n)
     fields = cut.apply(np.column_stack([arm, leg, torso, np.maximum(field, 0)]).astype(np.float32))
     for _ in range(_EVEN_STEPS):
         fields[:, 3] = smoothing @ fields[:, 3]
@@ -200,11 +200,11 @@ def _hang(garment: Garment, pattern: Pattern, cloth: np.ndarray, solid: np.ndarr
     local, within = ((points[rows] - posed.keypoints_m[INDEX["mid_hip"]]) @ R for points in (cloth, solid))
     x, y, z = local.T
     heights = np.linspace(within[:, 2].max(), within[:, 2].min(), 16)
-    outline = np.maximum.accumulate(_outline(within, heights, _N_ANGLES), axis=0)
+    angle = np.linspace(0, 2 * np.pi, 33)
+    outline = np.maximum.accumulate(_outline(within, heights, angle), axis=0)
     row = (z - heights[0]) / (heights[1] - heights[0])
-    column = np.mod(np.arctan2(y, x) * (_N_ANGLES / (2 * np.pi)), _N_ANGLES)
-    around = np.pad(outline, ((0, 0), (0, 1)), "wrap")
-    gap = map_coordinates(around, [row, column], order=1, mode="nearest") - np.hypot(x, y)
+    column = np.mod(np.arctan2(y, x), 2 * np.pi) / angle[1]
+    gap = map_coordinates(outline, [row, column], order=1, mode="nearest") - np.hypot(x, y)
     share = np.clip(garment.ease_m / _LOOSE_M, 0.5, 1) * np.clip((_CHEST - torso[rows]) / 0.15, 0, 1)
     away = share * np.clip(gap, 0, _MOST_AWAY_M) / np.hypot(x, y)
     hanging = cloth.copy()
@@ -212,10 +212,9 @@ def _hang(garment: Garment, pattern: Pattern, cloth: np.ndarray, solid: np.ndarr
     return hanging
 
 
-def _outline(points: np.ndarray, heights: np.ndarray, n_angles: int) -> np.ndarray:
+def _outline(points: np.ndarray, heights: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Radii (n_heights, n_angles) of the convex outline of points at heights, about their z axis."""
-    angle = np.linspace(0, 2 * np.pi, n_angles, endpoint=False)
-    ray, radius = np.stack([np.cos(angle), np.sin(angle)]), np.zeros((len(heights), n_angles))
+    ray, radius = np.stack([np.cos(angle), np.sin(angle)]), np.zeros((len(heights), len(angle)))
     for row, height in enumerate(heights):
         near = points[np.abs(points[:, 2] - height) < 0.05, :2]
         radius[row] = (near @ ray).max(axis=0) if len(near) > 8 else radius[row - 1]
@@ -276,10 +275,6 @@ def collar(garment: Garment, mesh: g.Mesh, posed: PosedBody, rise_m: float, open
     return g.Mesh(vertices, triangles, g.vertex_normals(vertices, triangles), coords)
 
 
-WAIST_M = 0.14
-"""Height of a skirt's waist above the hips."""
-
-
 def skirt(posed: PosedBody, layers_m: np.ndarray, length_m: float, flare: float, phase: float) -> g.Mesh:
     """A skirt around hips and legs: their outline at each height below the waist, folded towards the hem.
 
@@ -305,24 +300,16 @@ def skirt(posed: PosedBody, layers_m: np.ndarray, length_m: float, flare: float,
     hips, R = posed.keypoints_m[INDEX["mid_hip"]], posed.rotations[body.bone_numbers["root"]]
     worn = posed.vertices_m[legs] + posed.normals[legs] * layers_m[legs, None]
     points = (worn - hips) @ R  # x forward, y left, z up, in every pose
-    n_angles, n_rows = 72, 16
-    angle = np.linspace(0, 2 * np.pi, n_angles, endpoint=False)
-    ray = np.stack([np.cos(angle), np.sin(angle)])
-    heights = np.linspace(WAIST_M, -length_m, n_rows)
-    radius = _outline(points, heights, n_angles)
-    below = np.linspace(0, 1, n_rows)[:, None]
+    angle, heights = np.linspace(0, 2 * np.pi, 73), np.linspace(0.14, -length_m, 16)
+    radius, below = _outline(points, heights, angle), np.linspace(0, 1, len(heights))[:, None]
     radius = np.maximum.accumulate(radius * 0.97, axis=0) * (1 + flare * below**1.3) + 0.008
     folds = below * 0.016 * np.sin(9 * angle + phase + 2 * below)
     radius += folds + below * 0.008 * np.sin(17 * angle + 3 * phase)
-    radius = (radius + np.roll(radius, 1, 1) + np.roll(radius, -1, 1)) / 3
-    local = np.stack(np.broadcast_arrays(radius * ray[0], radius * ray[1], heights[:, None]), axis=-1)
-    grid = np.concatenate([local, local[:, :1]], axis=1)
-    vertices = (grid.reshape(-1, 3) @ R.T + hips).astype(np.float32)
-    rest = np.stack([0.2 * np.cos(angle), 0.2 * np.sin(angle)], axis=1)
-    rest = np.concatenate([rest, rest[:1]])
-    coords = np.zeros((n_rows, n_angles + 1, 7), np.float32)
-    coords[..., :2], coords[..., 2], coords[..., 6] = rest, heights[:, None], (1 - below)
-    return g.closed_grid(vertices.reshape(grid.shape), coords, axis=1)
+    around = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    coords = np.zeros((*radius.shape, 7), np.float32)
+    coords[..., :2], coords[..., 2], coords[..., 6] = 0.2 * around, heights[:, None], 1 - below
+    local = np.dstack([radius[..., None] * around, np.broadcast_to(heights[:, None], radius.shape)])
+    return g.closed_grid((local @ R.T + hips).astype(np.float32), coords, axis=1)
 
 
 def random_folds(rng: np.random.Generator, height_m: float, n_waves: int = 8) -> np.ndarray:
