@@ -51,6 +51,7 @@ class Garment:
     smoothing: int = 10
 
 
+# Chosen by eye, on development identities.
 _CHEST = 0.8  # in the `torso` field: from there cloth hangs
 _LOOSE_M = 0.014  # ease of a garment that hangs straight down
 _MOST_AWAY_M = 0.06  # of hanging cloth from the body
