@@ -144,8 +144,7 @@ def hair_grown() -> list[np.ndarray]:
         hair_styles.Style(0.3, 0.3, tie="bun", n_locks=200),
         hair_styles.Style(0.07, 0.05, coil_m=0.007, n_locks=300),
     ]
-    head = hair.obstacles(BODY, rest, landmarks)
-    grown = [hair.grow(style, BODY, rest, head, rng) for style, rng in zip(styles, rngs(4), strict=True)]
+    grown = [hair.grow(style, BODY, rest, landmarks, rng) for style, rng in zip(styles, rngs(4), strict=True)]
     carried = hair.carry(grown[0], BODY, posed, heads, landmarks)
     return [*map(mesh, grown), mesh(carried), looks(hair.hair_material(np.array([0.2, 0.1, 0.05])), 4)]
 
@@ -158,10 +157,10 @@ def garments() -> list[np.ndarray]:
     bottom = clothing.Garment("bottom", 1.93, 0.17)
     top = clothing.Garment("top", -0.1, 1.03, 0.55, 0.07)
     worn = [clothing.put_on(garment, posed, rest, folds, layers) for garment in (bottom, top)]
-    strip = clothing.collar(top, worn[1][0], posed, 0.022, 0.02)
-    skirt = clothing.skirt(posed, posed.rotations[BODY.bone_numbers["root"]], 0.5, 0.3, 1.0)
+    strip = clothing.collar(top, worn[1], posed, 0.022, 0.02)
+    skirt = clothing.skirt(posed, layers, 0.5, 0.3, 1.0)
     hidden = np.array([[clothing.cut_pattern(garment).hidden.sum()] for garment in (bottom, top)])
-    return [*(mesh(m) for m, _ in worn), mesh(strip), mesh(skirt), layers[:, None], folds, hidden]
+    return [*map(mesh, worn), mesh(strip), mesh(skirt), layers[:, None], folds, hidden]
 
 
 def cloths() -> list[np.ndarray]:
@@ -182,10 +181,7 @@ def cloths() -> list[np.ndarray]:
         )
         found.append(np.column_stack([look.albedo.T, look.height_m]))
     chest = fabrics.printed(np.random.default_rng(0))(rng.uniform(-0.1, 0.4, (2, 600)), np.full(600, 0.001))
-    numbers = [
-        [*f.colours.ravel(), f.pattern is None, f.weave_m, f.crease_m, f.roughness, f.gloss, f.fuzz]
-        for f in made
-    ]
+    numbers = [[*f.colours.ravel(), f.pattern is None, f.weave_m, f.crease_m, f.fuzz] for f in made]
     return [
         *found,
         chest.T,

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
+from scipy.ndimage import map_coordinates
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.core.memo import memoised
-from hicp_lib.simulation.body.model import Body, PosedBody, load_body
+from hicp_lib.simulation.body.model import PosedBody, load_body
 from hicp_lib.simulation.rendering import mesh as g
 
 
@@ -34,7 +35,8 @@ class Garment:
     thickness_m : float
         Everywhere.
     ease_m : float
-        Further distance from the body at hems.
+        Further distance from the body at hems. The more, the further cloth hangs off the trunk, and the
+        wider legs are.
     smoothing : int
         Steps of smoothing; more bridges wider hollows.
     """
@@ -49,6 +51,13 @@ class Garment:
     smoothing: int = 10
 
 
+# Chosen by eye, on development identities.
+_CHEST = 0.8  # in the `torso` field: from there cloth hangs
+_LOOSE_M = 0.014  # ease of a garment that hangs straight down
+_MOST_AWAY_M = 0.06  # of hanging cloth from the body
+_EVEN_STEPS = 4  # of smoothing, after which seams along hems are even
+
+
 @dataclass(frozen=True)
 class Pattern:
     """A cut-out garment with n vertices, ready to be put on.
@@ -57,19 +66,30 @@ class Pattern:
     ----------
     cut : g.Cut
     smoothing : array, shape (n, n)
-        Moves each vertex most of the way to the mean of its neighbours.
-    distance : array, shape (n,)
-        How far inside the garment's edge each vertex is, in its field's units.
+        See `g.smoothing`.
+    fields : array, shape (n, 4), dtype float32
+        The body's arm, leg and torso field, and how far inside the garment's edge each vertex is, in its
+        field's units.
     rim : array of int, shape (n_edges, 2)
         The boundary's directed edges.
+    edge : array of int, shape (n_rim,)
+        The boundary's vertices, which are repeated after the n, turned inwards: hems, cuffs and collars show
+        their thickness.
+    triangles : array of int, shape (n_triangles, 3)
+        Of n + n_rim vertices.
+    source : array of int, shape (n_triangles,)
+        Body triangle that each came from.
     hidden : array of bool, shape (n_t,)
         Body triangles well underneath.
     """
 
     cut: g.Cut
     smoothing: sparse.csr_array
-    distance: np.ndarray
+    fields: np.ndarray
     rim: np.ndarray
+    edge: np.ndarray
+    triangles: np.ndarray
+    source: np.ndarray
     hidden: np.ndarray
 
 
@@ -82,43 +102,42 @@ def cut_pattern(garment: Garment) -> Pattern:
 @memoised()
 def _cut_pattern(kind: str, start: float, end: float, sleeve: float, opening: float) -> Pattern:
     body = load_body()
+    arm, leg, torso = (body.field(name).astype(float) for name in ("arm", "leg", "torso"))
     if kind == "top":
-        field = _top_field(body, start, end, sleeve, opening)
+        covered = body.in_regions("hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh")
+        field = _top_field(body.vertices_m[0], arm, torso, start, end, sleeve, opening)
     else:
-        field = _bottom_field(body, start, end)
-    cut = g.cut(body.triangles, field)
-    deep = field > 0.03
-    return Pattern(
-        cut=cut,
-        smoothing=g.smoothing(cut.triangles, len(cut.i)),
-        distance=np.maximum(cut.apply(field.astype(np.float32)), 0),
-        rim=g.boundary_edges(cut.triangles),
-        hidden=deep[body.triangles].all(axis=1),
-    )
+        covered = body.in_regions("hips", "torso", "thigh", "shin", "foot") & (arm == 0)
+        field = np.minimum(end - torso, start - leg)
+    field = np.where(covered, field, -1)
+    cut, deep = g.cut(body.triangles, field), field > 0.03
+    n = len(cut.i)
+    smoothing = g.smoothing(cut.triangles, n)
+    fields = cut.apply(np.column_stack([arm, leg, torso, np.maximum(field, 0)]).astype(np.float32))
+    for _ in range(_EVEN_STEPS):
+        fields[:, 3] = smoothing @ fields[:, 3]
+    rim, owner = g.boundary_edges(cut.triangles), np.empty(n, int)
+    owner[cut.triangles.T.ravel()] = np.tile(cut.source, 3)
+    edge, (a, b) = np.unique(rim), rim.T
+    inner_a, inner_b = np.searchsorted(edge, rim.T) + n
+    strip = np.concatenate([np.stack([b, a, inner_a], axis=1), np.stack([b, inner_a, inner_b], axis=1)])
+    triangles = np.concatenate([cut.triangles, strip]).astype(np.int32)
+    source = np.concatenate([cut.source, np.tile(owner[a], 2)])
+    hidden = deep[body.triangles].all(axis=1)
+    return Pattern(cut, smoothing, fields, rim, edge, triangles, source, hidden)
 
 
-def _top_field(body: Body, start: float, end: float, sleeve: float, opening: float) -> np.ndarray:
-    arm, torso = (body.field(name).astype(float) for name in ("arm", "torso"))
-    rest = body.vertices_m[0]
-    front = np.clip(rest[:, 0] / 0.08, 0, 1) * np.clip(1 - np.abs(rest[:, 1]) / 0.10, 0, 1)
+def _top_field(rest_m: np.ndarray, arm, torso, start: float, end: float, sleeve: float, opening: float):
+    front = np.clip(rest_m[:, 0] / 0.08, 0, 1) * np.clip(1 - np.abs(rest_m[:, 1]) / 0.10, 0, 1)
     trunk = np.minimum(torso - start, end - opening * front.astype(float) - torso)
     on_arm = arm > 0
     trunk = np.where(on_arm, np.maximum(trunk, np.minimum(8 * arm, 0.5)), trunk)
-    field = np.minimum(trunk, np.where(on_arm, sleeve - arm, 9))
-    allowed = body.in_regions("hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh")
-    return np.where(allowed, field, -1)
-
-
-def _bottom_field(body: Body, end: float, waist: float) -> np.ndarray:
-    arm, leg, torso = (body.field(name).astype(float) for name in ("arm", "leg", "torso"))
-    field = np.minimum(waist - torso, end - leg)
-    allowed = body.in_regions("hips", "torso", "thigh", "shin", "foot") & (arm == 0)
-    return np.where(allowed, field, -1)
+    return np.minimum(trunk, np.where(on_arm, sleeve - arm, 9))
 
 
 def put_on(
     garment: Garment, posed: PosedBody, rest_m: np.ndarray, folds: np.ndarray, layers_m: np.ndarray
-) -> tuple[g.Mesh, np.ndarray]:
+) -> g.Mesh:
     """Put a garment on a posed body.
 
     Parameters
@@ -134,13 +153,11 @@ def put_on(
 
     Returns
     -------
-    mesh : g.Mesh
-        Its coords are rest position (3), arm, leg and torso field, distance from the edge.
-    source : array of int, shape (n_triangles,)
-        Body triangle that each of the mesh's triangles came from.
+    g.Mesh
+        Its coords are rest position (3) and the pattern's `fields`.
     """
     pattern = cut_pattern(garment)
-    cut, body = pattern.cut, load_body()
+    cut, edge = pattern.cut, pattern.edge
     skin, skin_normals = cut.apply(posed.vertices_m), g.unit(cut.apply(posed.normals))
     rest = cut.apply(rest_m.astype(np.float32))
     below = cut.apply(layers_m)
@@ -149,24 +166,25 @@ def put_on(
     for _ in range(garment.smoothing):
         smooth = pattern.smoothing @ smooth
     smooth, laid = smooth[:, :3], smooth[:, 3:]
+    if garment.kind == "top":
+        smooth = _hang(garment, pattern, smooth, skin + below[:, None] * skin_normals, posed)
     cloth = _drape(garment, pattern, smooth, skin, skin_normals, rest, folds, below)
     height = np.einsum("ij,ij->i", cloth - skin, skin_normals)
     for corners in (cut.i, cut.j):  # a cut edge lies between two of the body's vertices
         np.maximum.at(layers_m, corners, height)
-    normals = g.vertex_normals(cloth, cut.triangles)
-    fields = (cut.apply(body.field(name)) for name in ("arm", "leg", "torso"))
-    coords = np.column_stack([laid, *fields, pattern.distance])
-    return _with_rim(pattern, g.Mesh(cloth, cut.triangles, normals, coords.astype(np.float32)), skin)
+    inner = cloth - (height + 0.004)[:, None] * skin_normals  # into the skin, without a gap
+    vertices = np.concatenate([cloth, inner[edge]]).astype(np.float32)
+    coords = np.column_stack([laid, pattern.fields]).astype(np.float32)
+    normals = g.vertex_normals(vertices, pattern.triangles)
+    return g.Mesh(vertices, pattern.triangles, normals, np.concatenate([coords, coords[edge]]))
 
 
 def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, folds, below) -> np.ndarray:
-    body = load_body()
-    leg = pattern.cut.apply(body.field("leg")).astype(float)
-    ends = pattern.distance if garment.kind == "top" else garment.start - leg
-    away = garment.thickness_m + garment.ease_m * np.exp(-ends / 0.25).astype(float)
-    torso = pattern.cut.apply(body.field("torso"))
-    if garment.kind == "bottom":  # a waistband is tight
-        away = np.where(torso > 0, np.minimum(away, garment.thickness_m), away)
+    _, leg, torso, distance = pattern.fields.T.astype(float)
+    ends = distance if garment.kind == "top" else garment.start - leg
+    away = garment.thickness_m + garment.ease_m * np.exp(-ends / 0.25)
+    if garment.kind == "bottom":  # a waistband is tight, legs are wider below
+        away = np.where(torso > 0, garment.thickness_m, away + garment.ease_m * leg)
     away = np.maximum(away, below + 0.004 * (below > 0))
     cloth = _keep_away(cloth, skin, skin_normals, away)
     heights = sum(h * np.sin(rest @ np.array([x, y, z], np.float32) + p) for x, y, z, p, h in folds)
@@ -175,26 +193,38 @@ def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, 
     return _keep_away(pattern.smoothing @ cloth.astype(np.float32), skin, skin_normals, away)
 
 
+def _hang(garment: Garment, pattern: Pattern, cloth: np.ndarray, solid: np.ndarray, posed) -> np.ndarray:
+    """The trunk's cloth falls from chest and shoulder blades, the further from the body the looser it is."""
+    arm, _, torso, _ = pattern.fields.T
+    rows = np.flatnonzero((arm == 0) & (torso < _CHEST))
+    R = posed.rotations[load_body().bone_numbers["spine03"]].astype(np.float32)
+    local, within = ((points[rows] - posed.keypoints_m[INDEX["mid_hip"]]) @ R for points in (cloth, solid))
+    x, y, z = local.T
+    heights = np.linspace(within[:, 2].max(), within[:, 2].min(), 16)
+    angle = np.linspace(0, 2 * np.pi, 33)
+    outline = np.maximum.accumulate(_outline(within, heights, angle), axis=0)
+    row = (z - heights[0]) / (heights[1] - heights[0])
+    column = np.mod(np.arctan2(y, x), 2 * np.pi) / angle[1]
+    gap = map_coordinates(outline, [row, column], order=1, mode="nearest") - np.hypot(x, y)
+    share = np.clip(garment.ease_m / _LOOSE_M, 0.5, 1) * np.clip((_CHEST - torso[rows]) / 0.15, 0, 1)
+    away = share * np.clip(gap, 0, _MOST_AWAY_M) / np.hypot(x, y)
+    hanging = cloth.copy()
+    hanging[rows] += np.column_stack([away * x, away * y, 0 * z]).astype(np.float32) @ R.T
+    return hanging
+
+
+def _outline(points: np.ndarray, heights: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Radii (n_heights, n_angles) of the convex outline of points at heights, about their z axis."""
+    ray, radius = np.stack([np.cos(angle), np.sin(angle)]), np.zeros((len(heights), len(angle)))
+    for row, height in enumerate(heights):
+        near = points[np.abs(points[:, 2] - height) < 0.05, :2]
+        radius[row] = (near @ ray).max(axis=0) if len(near) > 8 else radius[row - 1]
+    return radius
+
+
 def _keep_away(cloth: np.ndarray, skin: np.ndarray, normals: np.ndarray, away: np.ndarray) -> np.ndarray:
     distance = np.einsum("ij,ij->i", cloth - skin, normals)
     return (cloth + np.maximum(away - distance, 0)[:, None] * normals).astype(np.float32)
-
-
-def _with_rim(pattern: Pattern, mesh: g.Mesh, skin: np.ndarray) -> tuple[g.Mesh, np.ndarray]:
-    """Turn the cloth's edge inwards, so that hems, cuffs and collars show their thickness."""
-    a, b = pattern.rim.T
-    used, place = np.unique(np.concatenate([a, b]), return_inverse=True)
-    inner = place.reshape(2, -1) + len(mesh.vertices_m)
-    strip = np.concatenate([np.stack([b, a, inner[0]], axis=1), np.stack([b, inner[0], inner[1]], axis=1)])
-    vertices = np.concatenate([mesh.vertices_m, 0.75 * skin[used] + 0.25 * mesh.vertices_m[used]])
-    owner = np.full(len(mesh.vertices_m), -1)
-    owner[mesh.triangles.T.ravel()] = np.tile(pattern.cut.source, 3)
-    return g.Mesh(
-        vertices.astype(np.float32),
-        np.concatenate([mesh.triangles, strip]).astype(np.int32),
-        np.concatenate([mesh.normals, mesh.normals[used]]),
-        np.concatenate([mesh.coords, mesh.coords[used]]),
-    ), np.concatenate([pattern.cut.source, np.tile(owner[a], 2)])
 
 
 def collar(garment: Garment, mesh: g.Mesh, posed: PosedBody, rise_m: float, open_m: float) -> g.Mesh:
@@ -241,18 +271,19 @@ def collar(garment: Garment, mesh: g.Mesh, posed: PosedBody, rise_m: float, open
     lows = k * np.arange(len(rows) - 1)[:, None, None, None]
     triangles = (lows + strip).reshape(-1, 3).astype(np.int32)
     coords = np.tile(mesh.coords[:n][used], (len(rows), 1))
+    coords[:, 6] = 1  # without a hem
     coords[:, 2] += np.repeat([0, rise_m, rise_m + 0.01, rise_m + 0.02, 2 * rise_m + 0.02], k)
     return g.Mesh(vertices, triangles, g.vertex_normals(vertices, triangles), coords)
 
 
-def skirt(posed: PosedBody, hip_rotation: np.ndarray, length_m: float, flare: float, phase: float) -> g.Mesh:
+def skirt(posed: PosedBody, layers_m: np.ndarray, length_m: float, flare: float, phase: float) -> g.Mesh:
     """A skirt around hips and legs: their outline at each height below the waist, folded towards the hem.
 
     Parameters
     ----------
     posed : PosedBody
-    hip_rotation : array, shape (3, 3)
-        Of the pelvis, from rest to pose.
+    layers_m : array, shape (n_v,)
+        Distance from the skin of the clothes tucked into it.
     length_m : float
     flare : float
         How much wider than the legs the hem is, as a share.
@@ -266,30 +297,20 @@ def skirt(posed: PosedBody, hip_rotation: np.ndarray, length_m: float, flare: fl
     """
     body = load_body()
     legs = (body.field("leg") > 0) | body.in_regions("hips")
-    legs |= body.in_regions("torso") & (body.field("torso") < 0.22) & (body.field("arm") == 0)
-    hips = posed.keypoints_m[INDEX["mid_hip"]]
-    points = (posed.vertices_m[legs] - hips) @ hip_rotation  # x forward, y left, z up, in every pose
-    n_angles, n_rows = 72, 16
-    angle = np.linspace(0, 2 * np.pi, n_angles, endpoint=False)
-    ray = np.stack([np.cos(angle), np.sin(angle)])
-    heights = np.linspace(0.14, -length_m, n_rows)
-    radius = np.empty((n_rows, n_angles))
-    for row, height in enumerate(heights):
-        near = points[np.abs(points[:, 2] - height) < 0.05, :2]
-        radius[row] = (near @ ray).max(axis=0) if len(near) > 8 else radius[row - 1]
-    below = np.linspace(0, 1, n_rows)[:, None]
+    legs |= body.in_regions("torso") & (body.field("torso") < 0.32) & (body.field("arm") == 0)
+    hips, R = posed.keypoints_m[INDEX["mid_hip"]], posed.rotations[body.bone_numbers["root"]]
+    worn = posed.vertices_m[legs] + posed.normals[legs] * layers_m[legs, None]
+    points = (worn - hips) @ R  # x forward, y left, z up, in every pose
+    angle, heights = np.linspace(0, 2 * np.pi, 73), np.linspace(0.14, -length_m, 16)
+    radius, below = _outline(points, heights, angle), np.linspace(0, 1, len(heights))[:, None]
     radius = np.maximum.accumulate(radius * 0.97, axis=0) * (1 + flare * below**1.3) + 0.008
     folds = below * 0.016 * np.sin(9 * angle + phase + 2 * below)
     radius += folds + below * 0.008 * np.sin(17 * angle + 3 * phase)
-    radius = (radius + np.roll(radius, 1, 1) + np.roll(radius, -1, 1)) / 3
-    local = np.stack(np.broadcast_arrays(radius * ray[0], radius * ray[1], heights[:, None]), axis=-1)
-    grid = np.concatenate([local, local[:, :1]], axis=1)
-    vertices = (grid.reshape(-1, 3) @ hip_rotation.T + hips).astype(np.float32)
-    rest = np.stack([0.2 * np.cos(angle), 0.2 * np.sin(angle)], axis=1)
-    rest = np.concatenate([rest, rest[:1]])
-    coords = np.zeros((n_rows, n_angles + 1, 7), np.float32)
-    coords[..., :2], coords[..., 2], coords[..., 6] = rest, heights[:, None], (1 - below)
-    return g.closed_grid(vertices.reshape(grid.shape), coords, axis=1)
+    around = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    coords = np.zeros((*radius.shape, 7), np.float32)
+    coords[..., :2], coords[..., 2], coords[..., 6] = 0.2 * around, heights[:, None], 1 - below
+    local = np.dstack([radius[..., None] * around, np.broadcast_to(heights[:, None], radius.shape)])
+    return g.closed_grid((local @ R.T + hips).astype(np.float32), coords, axis=1)
 
 
 def random_folds(rng: np.random.Generator, height_m: float, n_waves: int = 8) -> np.ndarray:

@@ -19,6 +19,7 @@ the front."""
 
 _PANEL_ENDS = (("mid_hip", "neck"), ("left_shoulder", "left_wrist"), ("right_shoulder", "right_wrist"),
                ("left_hip", "left_ankle"), ("right_hip", "right_ankle"))  # fmt: skip
+_BACK_M = 3.0  # where the trunk's back is on its panel: prints are on the chest only
 _PANEL_RADII_M = np.array([0.15, 0.06, 0.06, 0.085, 0.085], np.float32)  # assumed radii of limbs
 
 
@@ -67,6 +68,7 @@ def panel_coordinates(panels: Panels, coords: np.ndarray, limbs: str) -> tuple[n
         if number == 0 and limbs:  # two flat panels, front and back, that bend round the sides
             x, y = local[0], local[1]
             around = y + np.sign(y) * np.maximum(0.04 - np.abs(x), 0)
+            around = np.where(x < 0, _BACK_M - around, around)
         uv[0, rows], uv[1, rows] = around, along
     return uv, panel
 
@@ -87,16 +89,14 @@ class Fabric:
         third if it has one, (1, n) or (2, n); None for plain cloth.
     weave_m, crease_m : float
         Bump heights.
-    roughness, gloss, fuzz : float
-        See `surfaces.Look`; fuzz is its softness.
+    fuzz : float
+        The softness of `surfaces.Look`.
     """
 
     colours: np.ndarray
     pattern: Weights | None = None
     weave_m: float = 0.00012
     crease_m: float = 0.004
-    roughness: float = 0.85
-    gloss: float = 0.02
     fuzz: float = 0.15
 
 
@@ -157,7 +157,7 @@ def denim(rng: Rng) -> Fabric:
         thigh = np.exp(-((uv[0] / 0.05) ** 2)) * np.exp(-(((uv[1] - 0.2) / 0.25) ** 2))
         return np.clip(0.55 * thigh + 0.10 * cloud[0] + 1.1 * grain, 0, 1)[None]
 
-    return Fabric(np.array([blue, worn, worn]), fade, 0.0002, rng.uniform(0.004, 0.007), 0.8, 0.02, 0.1)
+    return Fabric(np.array([blue, worn, worn]), fade, 0.0002, rng.uniform(0.004, 0.007), 0.1)
 
 
 def plain_fabric(rng: Rng, dark: bool = False) -> Fabric:
@@ -166,7 +166,7 @@ def plain_fabric(rng: Rng, dark: bool = False) -> Fabric:
     if rng.random() < 0.4:
         colour = hsv(rng.uniform(0.07, 0.12), rng.uniform(0.15, 0.45), rng.uniform(0.25, 0.8))
     crease_m, fuzz = rng.uniform(0.003, 0.006), rng.uniform(0.05, 0.2)
-    return Fabric(np.array([colour] * 3), None, 0.0001, crease_m, 0.85, 0.02, fuzz)
+    return Fabric(np.array([colour] * 3), None, 0.0001, crease_m, fuzz)
 
 
 @dataclass(frozen=True)
@@ -220,7 +220,7 @@ def cloth_material(fabric: Fabric, panels: Panels, limbs: str, trim: Trim) -> Ma
         albedo *= 1 + 0.10 * weave * (fabric.weave_m > 0) + 0.04 * soft
         height, albedo = _sew(trim, distance, rest, panel, height, albedo)
         height += np.float32(fabric.weave_m) * weave * (footprint_m < 0.002)
-        return Look(np.clip(albedo, 0.002, 0.95), height, fabric.gloss, fabric.roughness, fabric.fuzz)
+        return Look(np.clip(albedo, 0.002, 0.95), height, gloss=0.02, roughness=0.85, softness=fabric.fuzz)
 
     return look
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import convolve1d
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.core.memo import memoised
@@ -100,21 +101,13 @@ def _tube(local: np.ndarray, thickness: float) -> np.ndarray:
         near = local[np.abs(local[:, 0] - place) < 0.022, 1:]
         middles[row] = (near.min(axis=0) + near.max(axis=0)) / 2
         rows[row] = ((near - middles[row]) @ ray).max(axis=0)
-    smooth = np.array([0.25, 0.5, 0.25])
-    padded = np.pad(np.column_stack([rows, middles]), ((1, 1), (0, 0)), mode="edge")
-    mixed = smooth[0] * padded[:-2] + smooth[1] * padded[1:-1] + smooth[2] * padded[2:]
+    mixed = convolve1d(np.column_stack([rows, middles]), [0.25, 0.5, 0.25], axis=0, mode="nearest")
     rows, middles = mixed[:, :-2] + thickness, mixed[:, -2:]
-    grid = np.concatenate(
-        [places[:, None, None] + 0 * rows[..., None], middles[:, None] + rows[..., None] * ray.T], axis=-1
-    )
-
-    def cap(place: float, row: int, scale: float) -> np.ndarray:
-        ring = grid[row].copy()
-        ring[:, 0], ring[:, 1:] = place, middles[row] + scale * (ring[:, 1:] - middles[row])
-        return ring
-
-    heel, toe = ((start, 0, 0.0), (start + 0.003, 0, 0.75)), ((stop - 0.003, -1, 0.75), (stop, -1, 0.0))
-    return np.stack([*(cap(*end) for end in heel), *grid, *(cap(*end) for end in toe)])
+    which = np.clip(np.arange(-2, _N_ROWS + 2), 0, _N_ROWS - 1)  # the first and last slice close it, narrower
+    along, scale = [start, start + 0.003, *places, stop - 0.003, stop], np.ones(_N_ROWS + 4)
+    scale[[0, -1]], scale[[1, -2]] = 0, 0.75
+    slices = middles[which, None] + (scale[:, None] * rows[which])[..., None] * ray.T
+    return np.dstack([np.repeat(along, _N_ANGLES + 1).reshape(slices.shape[:2]), slices])
 
 
 def shoe_material(shoes: Shoes) -> Material:

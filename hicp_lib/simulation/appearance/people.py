@@ -101,6 +101,7 @@ def appearance_of(identity: Identity, skirts: bool = True) -> Appearance:
     return Appearance(identity.body, complexion, style, worn, skirt, shoes, int(rng.integers(2**31)))
 
 
+_TUCKED = 0.14  # where tops end that are tucked into a skirt, below its waist
 _TRIMS = {"polo": fabrics.Trim(0.025, 0.9), "shirt": fabrics.Trim(0.02, 1.0, "buttons")}
 
 
@@ -111,7 +112,8 @@ def _outfit(rng: Rng, woman: bool, skirts: bool) -> tuple[list[Worn], Skirt | No
         return [top, _bottom(rng, str(rng.choice(list(PEOPLE["bottoms"]), p=odds)))], None
     fabric = top.fabric if rng.random() < 0.4 else fabrics.random_fabric(rng, 0.6)
     skirt = (rng.uniform(0.38, 0.75), rng.uniform(0.05, 0.5), rng.uniform(0, 6), fabric)
-    return [top, _bottom(rng, "leggings")] if rng.random() < 0.4 else [top], skirt
+    tucked = replace(top, garment=replace(top.garment, start=_TUCKED))
+    return [tucked, _bottom(rng, "leggings")] if rng.random() < 0.4 else [tucked], skirt
 
 
 def _top(rng: Rng, kind: str, woman: bool) -> Worn:
@@ -136,7 +138,7 @@ def _bottom(rng: Rng, kind: str) -> Worn:
     if kind == "leggings":
         end = rng.choice([1.9, 1.5])
         garment = clothing.Garment("bottom", end, waist, thickness_m=0.002, ease_m=0.0, smoothing=2)
-        fabric = replace(fabrics.plain_fabric(rng, dark=True), crease_m=0.0005, gloss=0.03, roughness=0.6)
+        fabric = replace(fabrics.plain_fabric(rng, dark=True), crease_m=0.0005)
         return Worn(garment, fabric, fabrics.Trim(0.0), clothing.random_folds(rng, 0.0))
     end = rng.choice([0.7, 0.85, 0.95]) if kind == "shorts" else rng.choice([1.93, 2.0])
     ease = rng.choice([0.006, 0.012, 0.02])
@@ -152,30 +154,28 @@ def part_of_vertices(body: Body) -> np.ndarray:
 
 
 @memoised(64)
-def _measured(shape: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, fabrics.Panels, hair.Obstacles]:
-    """Of a shape at rest: vertices, bone heads, keypoints, panels of cloth, surfaces below hair."""
+def _measured(shape: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, fabrics.Panels]:
+    """Of a shape at rest: vertices, bone heads, keypoints, panels of cloth."""
     body = load_body()
     rest, heads = rest_shape(body, shape)
     landmarks = body.keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
-    return rest, heads, landmarks, fabrics.make_panels(landmarks), hair.obstacles(body, rest, landmarks)
+    return rest, heads, landmarks, fabrics.make_panels(landmarks)
 
 
 @memoised(4)  # for people who are seen in many frames
 def _fit(appearance: Appearance) -> tuple[np.ndarray, g.Mesh | None]:
     """What is the same for a person in all poses: paint, and hair at rest."""
     body = load_body()
-    rest, _, landmarks, _, head = _measured(appearance.shape)
+    rest, _, landmarks, _ = _measured(appearance.shape)
     paint, rng = skin.paint_coords(body, rest, landmarks), np.random.default_rng(appearance.seed)
-    return paint, hair.grow(appearance.style, body, rest, head, rng) if appearance.style else None
+    return paint, hair.grow(appearance.style, body, rest, landmarks, rng) if appearance.style else None
 
 
 @memoised()
-def _always_hidden() -> tuple[np.ndarray, np.ndarray]:
-    """Triangles of the body that are never seen: inside the mouth, as lips are closed; inside shoes."""
+def _beyond(field: str, least: float) -> np.ndarray:
+    """Whether all corners of each of the body's triangles lie beyond a value of one of its fields."""
     body = load_body()
-    fields = (("mouth", 0.9), ("leg", 2.06))
-    mouth, feet = ((body.field(name)[body.triangles] > least).all(axis=1) for name, least in fields)
-    return mouth, feet
+    return (body.field(field)[body.triangles] > least).all(axis=1)
 
 
 _LIMBS = {"top": "arms", "bottom": "legs"}
@@ -198,25 +198,25 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
         In the frame of the posed person.
     """
     body, (paint, grown) = load_body(), _fit(appearance)
-    rest, heads, landmarks, panels, _ = _measured(appearance.shape)
+    rest, heads, landmarks, panels = _measured(appearance.shape)
     part = part_of_vertices(body)[body.triangles[:, 0]]
-    mouth, feet = _always_hidden()
-    surfaces, hidden = [], mouth.copy()
+    surfaces, hidden = [], _beyond("mouth", 0.9).copy()  # lips are closed
     layers = np.zeros(len(rest), np.float32)
     for worn in sorted(appearance.worn, key=lambda w: w.garment.kind):  # trousers before tops
-        mesh, source = clothing.put_on(worn.garment, posed, rest, worn.folds, layers)
-        hidden |= clothing.cut_pattern(worn.garment).hidden
-        limbs = _LIMBS[worn.garment.kind]
-        material = fabrics.cloth_material(worn.fabric, panels, limbs, worn.trim)
-        surfaces.append(Surface(mesh, material, person, part[source]))
+        mesh = clothing.put_on(worn.garment, posed, rest, worn.folds, layers)
+        pattern = clothing.cut_pattern(worn.garment)
+        hidden |= pattern.hidden
+        material = fabrics.cloth_material(worn.fabric, panels, _LIMBS[worn.garment.kind], worn.trim)
+        surfaces.append(Surface(mesh, material, person, part[pattern.source]))
         if worn.collar:
             strip = clothing.collar(worn.garment, mesh, posed, 0.022, 0.02)
-            material = fabrics.cloth_material(worn.fabric, panels, "arms", fabrics.Trim(0.0))
             surfaces.append(_of_region("neck", strip, material, person))
     if appearance.skirt is not None:
-        surfaces.append(_skirt(appearance.skirt, body, posed, panels, person))
+        *cut, fabric = appearance.skirt
+        material = fabrics.cloth_material(fabric, panels, "", fabrics.Trim(0.02, 0.95))
+        surfaces.append(_of_region("hips", clothing.skirt(posed, layers, *cut), material, person))
     if appearance.shoes is not None:
-        hidden |= feet
+        hidden |= _beyond("leg", 2.06)
         surfaces.append(_shoes(appearance.shoes, posed, person))
     surfaces.insert(0, _skin(appearance, posed, paint, ~hidden, part, person))
     if grown is not None:
@@ -233,14 +233,6 @@ def _skin(appearance: Appearance, posed: PosedBody, paint, shown, part, person: 
     covered = appearance.complexion.stubble * 0.3 if appearance.style is None else 1.0
     mesh = g.Mesh(posed.vertices_m, load_body().triangles[shown], posed.normals, paint)
     return Surface(mesh, skin.skin_material(appearance.complexion, covered), person, part[shown])
-
-
-def _skirt(skirt: Skirt, body: Body, posed: PosedBody, panels: fabrics.Panels, person: int) -> Surface:
-    hips = posed.rotations[body.bone_numbers["root"]]
-    *cut, fabric = skirt
-    mesh = clothing.skirt(posed, hips, *cut)
-    material = fabrics.cloth_material(fabric, panels, "", fabrics.Trim(0.02, 0.95))
-    return _of_region("hips", mesh, material, person)
 
 
 def _shoes(shoes: footwear.Shoes, posed: PosedBody, person: int) -> Surface:

@@ -157,7 +157,7 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
         c = dict(zip(COORDS, coords, strict=True))
         uv = np.stack([c["y"] + 0.5 * c["x"], c["z"] + 0.3 * c["x"]])
         blotches, pores, freckles = textures.sample(textures.skin, uv, footprint_m)
-        flush = np.clip(c["flush"] * (1 + 0.25 * blotches) + 0.07 * blotches, -0.2, 1)
+        flush = np.clip(c["flush"] * (0.8 + 0.1 * blotches) + 0.04 * blotches, -0.2, 1)
         flush *= 1 - 0.4 * complexion.tone
         albedo = column(tone) + (column(red) - column(tone)) * flush
         albedo *= 1 + 0.02 * blotches + 0.025 * pores
@@ -166,7 +166,8 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
         gloss, softness = 0.035 + 0.01 * pores, np.ones(len(uv[0]), np.float32)
         roughness: np.ndarray = np.full(len(uv[0]), 0.46, np.float32)
         albedo, roughness = _paint_lips(complexion, tone, albedo, roughness, c)
-        albedo = _paint_hair(complexion, scalp, albedo, c, uv, footprint_m)
+        albedo, bare = _paint_hair(complexion, scalp, albedo, c, uv, footprint_m)
+        gloss *= 0.2 + 0.8 * bare  # hair's roots do not shine as skin does
         nail = 0.7 * _step(c["nail"], 0.3, 0.7)
         albedo = albedo * (1 - nail) + nail * column(tone * np.array([1.08, 0.92, 0.90]))
         roughness = roughness * (1 - 0.4 * nail)
@@ -176,7 +177,7 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
             gloss[eye], roughness[eye], softness[eye] = 0.06, 0.16, 0.3
         inside = c["mouth"] > 0.7
         albedo[:, inside] = column([0.12, 0.03, 0.03])
-        return Look(albedo, 0.00009 * pores, gloss, roughness, softness)
+        return Look(albedo, 0.00005 * pores, gloss, roughness, softness)
 
     return look
 
@@ -200,19 +201,20 @@ def _paint_lips(complexion: Complexion, tone, albedo, roughness, c) -> tuple[np.
     return albedo, roughness - 0.14 * weight
 
 
-def _paint_hair(complexion: Complexion, scalp: float, albedo, c, uv, footprint) -> np.ndarray:
-    """Eyebrows, lashes, stubble and the hair's roots."""
+def _paint_hair(complexion: Complexion, scalp, albedo, c, uv, footprint) -> tuple[np.ndarray, np.ndarray]:
+    """Eyebrows, lashes, stubble and the hair's roots; and how much of the skin they leave bare."""
     hair = column(complexion.hair) * 0.7
     slanted = np.stack([uv[0] + uv[1], uv[1] * 2 - uv[0]])
     fibre = textures.sample(textures.strands, slanted, footprint)[0]
-    brow = complexion.brows * _step(c["brow_m"] + 0.0008 * fibre, -0.0026, 0.0008)
+    brow = 0.9 * complexion.brows * _step(c["brow_m"] + 0.0016 * fibre, -0.003, 0.002)
     lash = 0.85 * _step(c["lash_m"], -0.0008, 0.0006)
-    roots = scalp * _step(c["hairline_m"] + 0.002 * fibre, -0.001, 0.006)
+    roots = scalp * _step(c["hairline_m"] + 0.003 * fibre, -0.003, 0.005)
     stubble = complexion.stubble * _step(c["beard_m"] + 0.001 * fibre, -0.002, 0.012)
     stubble *= 1 - _step(c["lips"], 0.2, 0.5)
     cover = 1 - (1 - brow) * (1 - roots) * (1 - stubble * (0.75 + 0.2 * fibre))
-    albedo = albedo + (hair * (1 + 0.3 * fibre) - albedo) * np.clip(cover, 0, 1)
-    return np.clip(albedo * (1 - lash) + 0.012 * lash, 0.001, 1)
+    cover = np.clip(cover, 0, 1)
+    albedo = albedo + (hair * (1 + 0.3 * fibre) - albedo) * cover
+    return np.clip(albedo * (1 - lash) + 0.012 * lash, 0.001, 1), 1 - cover
 
 
 def _eye(complexion: Complexion, angle: np.ndarray) -> np.ndarray:

@@ -15,8 +15,7 @@ from hicp_lib.simulation.body.model import Body, pose_bones
 from hicp_lib.simulation.body.reach import reach
 from hicp_lib.simulation.body.self_collision import CollisionModel
 
-Range = tuple[float, float]
-Ranges = dict[str, Range]
+Ranges = dict[str, tuple[float, float]]
 
 _OTHER = {"left": "right", "right": "left"}
 _OUTWARD = {"left": 1, "right": -1}  # along y, which points to the person's left
@@ -87,34 +86,33 @@ def swinging(draft: Draft, joints: Joints) -> Joints:
 
 def one_reaching(draft: Draft, joints: Joints) -> Joints | None:
     """One arm reaches forward."""
-    return _to_the_front(draft, joints, _side(draft.rng), (-25, 30), (-40, 25), (0.7, 0.99))
+    return _to_the_front(draft, joints, _side(draft.rng), "one")
 
 
 def both_reaching(draft: Draft, joints: Joints) -> Joints | None:
     """Both arms reach forward."""
-    left = _to_the_front(draft, joints, "left", (-12, 25), (-40, 20), (0.7, 0.99))
-    return left and _to_the_front(draft, left, "right", (-12, 25), (-40, 20), (0.7, 0.99))
+    left = _to_the_front(draft, joints, "left", "both")
+    return left and _to_the_front(draft, left, "right", "both")
 
 
 def pointing(draft: Draft, joints: Joints) -> Joints | None:
     """One arm, nearly straight, points somewhere ahead or to its side; the other hand is at ease."""
     side = _side(draft.rng)
     joints = joints | sample_hand(draft.rng, "relaxed", f"{_OTHER[side]}_")
-    found = _to_the_front(draft, joints, side, (-20, 70), (-35, 45), (0.88, 0.99))
+    found = _to_the_front(draft, joints, side, "pointing")
     return found and found | uniform(draft.rng, _WRISTS_DEG["pointing"], f"{side}_")
 
 
-def _to_the_front(
-    draft: Draft, joints: Joints, side: str, azimuth_deg: Range, elevation_deg: Range, share: Range
-) -> Joints | None:
+def _to_the_front(draft: Draft, joints: Joints, side: str, kind: str) -> Joints | None:
     """An arm towards a direction (azimuth outward from straight ahead), by a share of its length."""
+    ranges = PEOPLE["to_the_front"][kind]
     heads = _heads(draft, joints, side)
     chain = np.array([heads[bone] for bone in ("upperarm01", "lowerarm01", "wrist")])
     length = np.linalg.norm(np.diff(chain, axis=0), axis=1).sum()
-    azimuth, elevation = (np.radians(draft.rng.uniform(*limits)) for limits in (azimuth_deg, elevation_deg))
+    azimuth, elevation = (np.radians(draft.rng.uniform(*ranges[a])) for a in ("azimuth_deg", "elevation_deg"))
     direction = np.array([np.cos(azimuth), np.sin(azimuth) * _OUTWARD[side], np.tan(elevation)])
     direction /= np.linalg.norm(direction)
-    target = heads["upperarm01"] + draft.rng.uniform(*share) * length * direction
+    target = heads["upperarm01"] + draft.rng.uniform(*ranges["share"]) * length * direction
     return _bring(draft, joints, side, target, (0, draft.rng.uniform(0.1, 0.9), -1), "front")
 
 

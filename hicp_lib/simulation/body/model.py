@@ -25,7 +25,7 @@ from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.core.memo import memoised
-from hicp_lib.core.rotations import rotation
+from hicp_lib.core.rotations import rotations_from_vectors
 from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.rendering.mesh import vertex_normals
 
@@ -274,11 +274,13 @@ def rotation_matrices(body: Body, pose: Pose) -> np.ndarray:
     KeyError
         For a bone the model does not have.
     """
-    number = body.bone_numbers
-    result = np.tile(np.eye(3), (len(number), 1, 1))
+    n = len(body.bone_names)
+    matrices, vectors = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
     for name, turn in pose.items():
-        result[number[name]] = turn if np.ndim(turn) == 2 else rotation(turn)
-    return result
+        (matrices if np.ndim(turn) == 2 else vectors)[body.bone_numbers[name]] = turn
+    turned = np.flatnonzero(vectors.any(axis=1))
+    matrices[turned] = rotations_from_vectors(vectors[turned])  # all together, which is faster
+    return matrices
 
 
 def rest_shape(body: Body, shape: Shape) -> tuple[np.ndarray, np.ndarray]:

@@ -99,8 +99,8 @@ def _draw(draft: Draft, kind: str) -> Joints | None:
     return place_arms(draft, joints)
 
 
-def _stand(rng: np.random.Generator) -> Joints:
-    joints = uniform(rng, _RANGES_DEG["standing"], "left_") | uniform(rng, _RANGES_DEG["standing"], "right_")
+def _stand(rng: np.random.Generator, kind: str = "standing") -> Joints:
+    joints = uniform(rng, _RANGES_DEG[kind], "left_") | uniform(rng, _RANGES_DEG[kind], "right_")
     return joints | _level_feet(joints)
 
 
@@ -115,8 +115,7 @@ def _walk(rng: np.random.Generator) -> Joints:
 
 
 def _sit(rng: np.random.Generator) -> Joints:
-    joints = uniform(rng, _RANGES_DEG["sitting"], "left_") | uniform(rng, _RANGES_DEG["sitting"], "right_")
-    return joints | _level_feet(joints) | uniform(rng, {"spine_flexion": (-5, 22)})
+    return _stand(rng, "sitting") | uniform(rng, {"spine_flexion": (-5, 22)})
 
 
 def _lean(rng: np.random.Generator) -> Joints:

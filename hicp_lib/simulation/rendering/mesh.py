@@ -109,6 +109,8 @@ def cut(triangles: np.ndarray, field: np.ndarray) -> Cut:
 def smoothing(triangles: np.ndarray, n_vertices: int) -> sparse.csr_array:
     """A smoothing step as a matrix: vertices move most of the way to the mean of their neighbours.
 
+    Those on the boundary move along it, to the mean of their neighbours there: hems become smooth curves.
+
     Parameters
     ----------
     triangles : array of int, shape (n, 3)
@@ -120,16 +122,15 @@ def smoothing(triangles: np.ndarray, n_vertices: int) -> sparse.csr_array:
     array, shape (n_vertices, n_vertices), dtype float32
         Sparse.
     """
-    pairs = _directed_edges(triangles)
-    ends = np.concatenate([pairs, pairs[:, ::-1]]).T
+    pairs, rim = _directed_edges(triangles), boundary_edges(triangles)
+    ends = np.concatenate([pairs, pairs[:, ::-1]])
+    inner = ~np.isin(ends[:, 0], rim)
+    ends = np.concatenate([ends[inner], rim, rim[:, ::-1]]).T
     shape = (n_vertices, n_vertices)
     mean = sparse.coo_array((np.ones(len(ends[0]), np.float32), ends), shape=shape).tocsr()
-    # Eighths are assigned in turn: beyond eight neighbours, the last get none.
     count = np.diff(mean.indptr)
-    number = np.arange(mean.nnz) - np.repeat(mean.indptr[:-1], count)
-    mean.data = ((7 - number) // np.repeat(count, count) + 1).astype(np.float32) / 8
-    own = sparse.eye_array(n_vertices, dtype=np.float32)
-    return sparse.csr_array(np.float32(0.4) * own + np.float32(0.6) * mean)
+    mean.data = np.float32(0.6) / np.repeat(count, count).astype(np.float32)
+    return sparse.csr_array(np.float32(0.4) * sparse.eye_array(n_vertices, dtype=np.float32) + mean)
 
 
 def boundary_edges(triangles: np.ndarray) -> np.ndarray:

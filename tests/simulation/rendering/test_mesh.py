@@ -42,4 +42,7 @@ def test_boundary_and_smoothing_of_a_grid():
     triangles = g.grid_triangles(4, 5)
     assert len(g.boundary_edges(triangles)) == 2 * (3 + 4)
     step = g.smoothing(triangles, 20).toarray()
-    assert np.flatnonzero(step[0]).tolist() == [0, 1, 5, 6] and np.allclose(step.sum(axis=1), 1)
+    assert np.allclose(step.sum(axis=1), 1) and np.allclose(np.diag(step), 0.4)
+    on_edge, within = ({k: round(step[row, k], 6) for k in np.flatnonzero(step[row])} for row in (2, 6))
+    assert on_edge == {1: 0.3, 2: 0.4, 3: 0.3}  # along the boundary only
+    assert within == {0: 0.1, 1: 0.1, 5: 0.1, 6: 0.4, 7: 0.1, 11: 0.1, 12: 0.1}
