@@ -296,8 +296,9 @@ def evaluate(
     people = read_annotations(annotations, keypoint_map)
     found = read_detections(detections, people)
     _tell_notes(annotations, people.notes, area)
-    options = {"area": area} | ({"sigmas": sigmas} if sigmas else {})
-    judged = judgement.judge(people, found, [group] if group else GROUPS, by_image, seed, **options)
+    options = {"area": area} | ({} if sigmas is None else {"sigmas": sigmas})
+    groups = GROUPS if group is None else [group]
+    judged = judgement.judge(people, found, groups, by_image, seed, **options)
     if out is not None:
         judgement.write_judgement(out, judged)
     if as_json:

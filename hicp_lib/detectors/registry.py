@@ -201,6 +201,8 @@ def _check_options(name: str, detector_class: type, options: dict) -> None:
             raise InputError(
                 f"detector {name!r} has no option {option!r}; expected one of: {', '.join(kinds)}"
             )
+        if value == "":
+            raise InputError(f"detector {name!r}: option {option!r} is empty; give a value, or leave it out")
         kind = kinds[option] | int if float in (kinds[option], *get_args(kinds[option])) else kinds[option]
         takes_bool = bool in (kinds[option], *get_args(kinds[option]))
         if not isinstance(value, kind) or (isinstance(value, bool) and not takes_bool):
