@@ -204,7 +204,7 @@ def detect(
     Results are cached: after an interruption, the same command does only the rest. An image that cannot be
     read is reported and skipped; if none can be read, the exit code is 2.
     """
-    from hicp_lib.detectors.registry import DETECTORS, describe, make_detector
+    from hicp_lib.detectors.registry import describe, make_detector
     from hicp_lib.detectors.runtime.to_file import detect_to_file, open_dataset, open_pictures
     from hicp_lib.formats.detection_files import refuse_other_suffix
 
@@ -212,12 +212,11 @@ def detect(
     if source is None or (dataset_dir and images_dir):
         raise click.UsageError("Give either --dataset DIR or --images DIR.", click.get_current_context())
     refuse_other_suffix(out)
-    needs_model = detector in DETECTORS and DETECTORS[detector].needs_model
-    # Kept until the end: the runs share its open network.
-    made = make_detector(detector, **given(**chosen)) if needs_model else None
+    options = given(**chosen)
+    made = make_detector(detector, **options)  # kept until the end: the runs share its open network
     pictures = open_pictures(source) if dataset_dir is None else open_dataset(source)
-    options = {"workers": workers, "strict": strict} | given(**chosen)
     lines = partial(say, err=False) if by_image else None
+    options |= {"workers": workers, "strict": strict}
     n_people, n_images, n_broken = detect_to_file(detector, pictures, out, say, lines, **options)
     passed_over = f"; {n_broken} could not be read" * bool(n_broken)
     click.echo(f"{out}: {n_people} people in {n_images} images{passed_over}")
@@ -225,8 +224,7 @@ def detect(
         images = shlex.quote(str(source if dataset_dir is None else source / "images"))
         page = shlex.quote(str(out.with_suffix(".html")))
         click.echo(f"look: hicp draw --detections {shlex.quote(str(out))} --images {images} --out {page}")
-    if made is not None:
-        tell_assumed(describe(made))
+    tell_assumed(describe(made))
 
 
 @hicp.command("import")

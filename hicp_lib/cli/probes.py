@@ -7,12 +7,11 @@ process, since a native library may abort or hang.
 import sys
 from collections.abc import Callable
 from functools import partial
-from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 
 from hicp_lib.core.children import end_with
+from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import one_line
 from hicp_lib.core.extras import MissingPartError
 from hicp_lib.core.images import read_image
@@ -32,19 +31,9 @@ def probes() -> dict[str, Callable[[], str]]:
 
 
 def _detect(names: list[str]) -> str:
-    picture, shown = _picture()
-    found = [len(make_detector(name).detect(picture)) for name in names]
-    return f"in {shown}: {', '.join(map(str, found))}"
-
-
-def _picture() -> tuple[np.ndarray, str]:
-    """A photograph of a person that Matplotlib ships, or without it a plain image."""
-    if find_spec("matplotlib") is None:
-        return np.full((480, 640, 3), 128, np.uint8), "a plain picture"
-    import matplotlib
-
-    path = Path(matplotlib.get_data_path()) / "sample_data" / "grace_hopper.jpg"
-    return read_image(path), "a photograph of one person"
+    photograph = read_image(DATA_DIR / "photograph.jpg")
+    found = [len(make_detector(name).detect(photograph)) for name in names]
+    return f"in a photograph of one person: {', '.join(map(str, found))}"
 
 
 def _render() -> str:

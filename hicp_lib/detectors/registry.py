@@ -121,7 +121,7 @@ def command_to_use(name: str) -> str:
     return f"hicp models use --detector {name} --model FILE.onnx"
 
 
-def make_detector(name: str, **options) -> Detector:
+def make_detector(name: str, /, **options) -> Detector:
     """A detector ready to run.
 
     A detector that needs a model and gets none uses the registered one (`hicp_lib.detectors.weights.user`).

@@ -92,6 +92,15 @@ OUTPUTS = {
 PLACES = {"nowhere": "", "of 5,000 characters": "a" * 5000 + ".json", "below a file": "results.json/out.json",
           "in /proc": "/proc/out.json", "in /dev": "/dev/null/out.json",
           "with a line": "out\n.xyz"}  # fmt: skip
+# What the library calls its own arguments.
+NO_OPTIONS = "name images workers self detector boxes_px progress options out tell".split()
+WITH_DETECTORS = {
+    "detect": f"{DETECT} --out out.json",
+    "lift": f"{LIFT} --out out.parquet",
+    "models show": "models show --detector movenet-lightning",
+    "models use": "models use --detector mmpose --model model.onnx",
+    "combined": f"{ANY} combined:movenet-lightning+mediapipe-hands",
+}
 EMPTY_FOLDERS = ("scenes render '' --n 1", "record simulate mocap '' --n-frames 1", "record check ''",
                  "inspect ''", "record import '' --bag x.bag",
                  "report --profile quick --results ''")  # fmt: skip
@@ -163,6 +172,9 @@ def cases() -> Iterator[Case]:
                 [*command.split(), "--out", place],
                 exits=(0, 2) if "line" in kind else (2,),
             )
+    for name, command in WITH_DETECTORS.items():
+        for option in NO_OPTIONS:
+            yield Case(f"option: {name} -o {option}", [*command.split(), "-o", option, "3"])
     for command in EMPTY_FOLDERS:
         yield Case(f"option: {command}", command)
     for detector, options in TEXTS_OF_DETECTORS.items():
