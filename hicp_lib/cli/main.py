@@ -213,8 +213,8 @@ def detect(
         raise click.UsageError("Give either --dataset DIR or --images DIR.", click.get_current_context())
     refuse_other_suffix(out)
     options = given(**chosen)
-    made = make_detector(detector, **options)  # kept until the end: the runs share its open network
     pictures = open_pictures(source) if dataset_dir is None else open_dataset(source)
+    made = make_detector(detector, **options)  # kept until the end: the runs share its open network
     lines = partial(say, err=False) if by_image else None
     options |= {"workers": workers, "strict": strict}
     n_people, n_images, n_broken = detect_to_file(detector, pictures, out, say, lines, **options)
