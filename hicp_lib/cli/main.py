@@ -370,8 +370,8 @@ def report(
 @hicp.command()
 def doctor() -> int:
     """Check the installation: one line each, with the remedy."""
-    from hicp_lib.cli.doctor import FAIL, run_checks
+    from hicp_lib.cli.doctor import run_checks
 
     checks = run_checks()
     click.echo("\n".join(map(str, checks)))
-    return 2 if any(check.status == FAIL for check in checks) else 0
+    return 2 if any(check.is_ok is False for check in checks) else 0

@@ -4,6 +4,7 @@
 process, since a native library may abort or hang.
 """
 
+import json
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -16,9 +17,6 @@ from hicp_lib.core.errors import one_line
 from hicp_lib.core.extras import MissingPartError
 from hicp_lib.core.images import read_image
 from hicp_lib.detectors.registry import DETECTORS, default_detector_names, make_detector
-
-EXIT_FAILED, EXIT_ABSENT = 1, 3
-"""Exit codes if the trial failed, and if an optional part is not installed."""
 
 
 def probes() -> dict[str, Callable[[], str]]:
@@ -54,19 +52,18 @@ def _control() -> str:
     return f"{len(controller.velocities(home, []))} joint velocities"
 
 
-def main(name: str) -> int:
-    """Run one trial; prints its result in one line."""
+def main(name: str) -> None:
+    """Run one trial; prints in JSON whether it worked, null without its part, and a line on it."""
     end_with(0)
+    is_ok: bool | None = True
     try:
-        print(probes()[name]())
+        finding = probes()[name]()
     except MissingPartError as error:
-        print(error)
-        return EXIT_ABSENT
+        is_ok, finding = None, str(error)
     except Exception as error:  # a broken library may raise anything
-        print(one_line(error))
-        return EXIT_FAILED
-    return 0
+        is_ok, finding = False, one_line(error)
+    print(json.dumps([is_ok, finding]))
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    main(sys.argv[1])
