@@ -89,8 +89,9 @@ OUTPUTS = {
     "lift": LIFT,
     "evaluate": EVALUATE,
 }
-PLACES = {"nowhere": "", "of 5,000 characters": "a" * 5000 + ".json", "below a file": "results.json/out.json",
-          "in /proc": "/proc/out.json", "in /dev": "/dev/null/out.json",
+SUFFIXES = {"draw": ".html", "lift": ".csv"}  # of what the others write: .json
+PLACES = {"nowhere": "", "of 5,000 characters": "a" * 5000 + "{}", "below a file": "results.json/out{}",
+          "in /proc": "/proc/out{}", "in /dev": "/dev/null/out{}",
           "with a line": "out\n.xyz"}  # fmt: skip
 # What the library calls its own arguments.
 NO_OPTIONS = "name images workers self detector boxes_px progress options out tell".split()
@@ -169,7 +170,7 @@ def cases() -> Iterator[Case]:
         for kind, place in PLACES.items():
             yield Case(
                 f"option: {name} --out {kind}",
-                [*command.split(), "--out", place],
+                [*command.split(), "--out", place.format(SUFFIXES.get(name, ".json"))],
                 exits=(0, 2) if "line" in kind else (2,),
             )
     for name, command in WITH_DETECTORS.items():
