@@ -30,10 +30,10 @@ def calibration_fit(annotations: Path, detections: Path, detector: str, out: Pat
 
 @calibration.command("apply")
 @click.option("--calibrations", type=PATH, required=True, help="From `calibration fit` or the report.")
-@click.option("--detector", default="", help="Detector; needed if the file has several.")
+@click.option("--detector", help="Detector; needed if the file has several.")
 @click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
 @click.option("--out", type=PATH, required=True, help="Results to write; keeps the original scores too.")
-def calibration_apply(calibrations: Path, detector: str, detections: Path, out: Path) -> None:
+def calibration_apply(calibrations: Path, detector: str | None, detections: Path, out: Path) -> None:
     """Write results with calibrated keypoint scores; the original scores are kept too."""
     from hicp_lib.evaluation.calibration.files import apply_calibrations, read_calibrations
 

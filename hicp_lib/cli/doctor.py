@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.metadata
+import json
 import os
 import platform
 import re
@@ -17,7 +18,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hicp_lib.cli.probes import EXIT_ABSENT, EXIT_FAILED, probes
+from hicp_lib.cli.probes import probes
 from hicp_lib.cli.system_libraries import LIBRARIES, missing_packages
 from hicp_lib.core.checkout import working_folder
 from hicp_lib.core.children import child_environment, lifeline
@@ -30,8 +31,6 @@ from hicp_lib.study import provenance
 PYTHONS = ((3, 11), (3, 14))
 MIN_FREE_GB = 3.0
 PROBE_LIMIT_S = 120.0
-OK, ABSENT, FAIL = "ok", "--", "FAIL"
-"""Result of a check; absent is a part that was not installed, which is not a failure."""
 PROBE = (sys.executable, "-m", "hicp_lib.cli.probes")
 _LOCKED = "locked environment"
 _OPENCV = "opencv-python-headless"
@@ -47,8 +46,8 @@ class Check:
     ----------
     name : str
         What was checked.
-    status : str
-        `OK`, `ABSENT` or `FAIL`.
+    is_ok : bool or None
+        None for a part that was not installed, which is not a failure.
     finding : str
         What was found.
     remedy : str
@@ -56,30 +55,19 @@ class Check:
 
     Examples
     --------
-    >>> print(Check.of("results disk", False, "0.1 GB free", "free space"))
+    >>> print(Check("results disk", False, "0.1 GB free", "free space"))
     FAIL results disk: 0.1 GB free; remedy: free space
     """
 
     name: str
-    status: str
+    is_ok: bool | None
     finding: str
     remedy: str = ""
 
-    @classmethod
-    def of(cls, name: str, is_ok: bool, finding: str, remedy: str) -> Check:
-        """A check that passed or failed.
-
-        Parameters
-        ----------
-        name : str
-        is_ok : bool
-        finding, remedy : str
-        """
-        return cls(name, OK if is_ok else FAIL, finding, remedy)
-
     def __str__(self) -> str:
-        remedy = f"; remedy: {self.remedy}" if self.status == FAIL else ""
-        return f"{self.status:<4} {self.name}: {self.finding}{remedy}"
+        status = {True: "ok", None: "--", False: "FAIL"}[self.is_ok]
+        remedy = f"; remedy: {self.remedy}" if self.is_ok is False else ""
+        return f"{status:<4} {self.name}: {self.finding}{remedy}"
 
 
 def run_checks() -> list[Check]:
@@ -95,7 +83,7 @@ def _lines(check: Callable[[], Check | list[Check]]) -> list[Check]:
         found = check()
     except Exception as error:  # a broken installation may raise anything
         name = check.__name__.removeprefix("check_").replace("_", " ")
-        return [Check(name, FAIL, one_line(error), _remedy(one_line(error)))]
+        return [Check(name, False, one_line(error), _remedy(one_line(error)))]
     return found if isinstance(found, list) else [found]
 
 
@@ -104,28 +92,28 @@ def check_python() -> Check:
     oldest, newest = PYTHONS
     is_ok = oldest <= sys.version_info[:2] <= newest
     remedy = "make it again with a Python from 3.11 to 3.14: rm -r .venv; make report PYTHON=python3.12"
-    return Check.of("Python", is_ok, platform.python_version(), remedy)
+    return Check("Python", is_ok, platform.python_version(), remedy)
 
 
 def check_system_libraries() -> Check:
     """System libraries that the wheels load but do not contain."""
     missing = missing_packages()
     finding = f"missing: {' '.join(missing)}" if missing else "all that is needed"
-    return Check.of("system libraries", not missing, finding, f"sudo apt-get install {' '.join(missing)}")
+    return Check("system libraries", not missing, finding, f"sudo apt-get install {' '.join(missing)}")
 
 
 def check_locked_versions(lock_path: Path = provenance.LOCK_PATH) -> Check:
     """Whether the installed versions are those of the lock file."""
     if provenance.CHECKOUT is None:
-        return Check(_LOCKED, OK, "none: hicp was installed without a checkout")
+        return Check(_LOCKED, True, "none: hicp was installed without a checkout")
     try:
         locked = dict(locked_versions(lock_path.read_text()))
     except OSError as error:
-        return Check(_LOCKED, FAIL, f"{lock_path}: {error.strerror}", "git restore environment.lock")
+        return Check(_LOCKED, False, f"{lock_path}: {error.strerror}", "git restore environment.lock")
     found = {name: _installed(name) for name in locked}
     wrong = [f"{name} {found[name]} instead of {v}" for name, v in locked.items() if found[name] != v]
     finding = f"{len(wrong)} differ: {', '.join(wrong[:3])}" if wrong else f"{len(locked)} packages as locked"
-    return Check.of(_LOCKED, not wrong, finding, _REINSTALL)
+    return Check(_LOCKED, not wrong, finding, _REINSTALL)
 
 
 def locked_versions(lock: str) -> Iterator[tuple[str, str]]:
@@ -179,23 +167,17 @@ def check_probe(name: str, command: tuple[str, ...] = PROBE, limit_s: float = PR
         try:
             output, errors = process.communicate(timeout=limit_s)
         except subprocess.TimeoutExpired:
-            return Check(name, FAIL, f"no answer within {limit_s:g} s, ended", _remedy(""))
+            return Check(name, False, f"no answer within {limit_s:g} s, ended", _remedy(""))
         finally:
             with contextlib.suppress(ProcessLookupError):  # itself and its children
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
-    return _outcome(name, process.returncode, _last_line(output), _last_line(errors))
-
-
-def _outcome(name: str, code: int, output: str, errors: str) -> Check:
-    """The result of a finished trial; `output` and `errors` are the last lines on its two outputs."""
-    if code in (0, EXIT_ABSENT):
-        return Check(name, ABSENT if code else OK, output)
-    if code == EXIT_FAILED and output:
-        return Check(name, FAIL, output, _remedy(output))
+    if process.returncode == 0:
+        is_ok, finding = json.loads(_last_line(output))
+        return Check(name, is_ok, finding, _remedy(finding))
+    code, words = process.returncode, _last_line(errors)
     ending = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-    words = f" ({errors})" if errors else ""
-    return Check(name, FAIL, f"its process died of {ending}{words}", _remedy(errors))
+    return Check(name, False, f"its process died of {ending}{words and f' ({words})'}", _remedy(words))
 
 
 def _remedy(words: str) -> str:
@@ -219,7 +201,7 @@ def check_opencv() -> Check:
     uninstall = f"pip uninstall -y {others}; " if others else ""
     remedy = f"{uninstall}pip install --force-reinstall --no-deps {_OPENCV}"
     finding = f"{others} instead of {_OPENCV}" if others else f"{_OPENCV} {version}"
-    return Check.of("OpenCV", not others and version != "none", finding, remedy)
+    return Check("OpenCV", not others and version != "none", finding, remedy)
 
 
 def check_weights() -> Check:
@@ -229,9 +211,9 @@ def check_weights() -> Check:
     try:
         found = {weight.name: status(weight) for weight in registry().values()}
     except InputError as error:
-        return Check("weights", FAIL, str(error), "git restore data/detectors.json")
+        return Check("weights", False, str(error), "git restore data/detectors.json")
     wrong = ", ".join(f"{name} {state}" for name, state in found.items() if state != "present")
-    return Check.of("weights", not wrong, wrong or f"{len(found)} present and intact", "hicp models fetch")
+    return Check("weights", not wrong, wrong or f"{len(found)} present and intact", "hicp models fetch")
 
 
 def check_folders() -> list[Check]:
@@ -258,6 +240,6 @@ def check_folder(name: str, folder: Path, remedy: str) -> list[Check]:
     free_gb = shutil.disk_usage(there).free / 1e9
     room = f"{free_gb:.1f} GB free (at least {MIN_FREE_GB:.0f} wanted)"
     return [
-        Check.of(f"{name} folder", is_writable, finding, remedy),
-        Check.of(f"{name} disk", free_gb >= MIN_FREE_GB, room, f"free space on the disk of {there}"),
+        Check(f"{name} folder", is_writable, finding, remedy),
+        Check(f"{name} disk", free_gb >= MIN_FREE_GB, room, f"free space on the disk of {there}"),
     ]

@@ -204,7 +204,7 @@ def detect(
     Results are cached: after an interruption, the same command does only the rest. An image that cannot be
     read is reported and skipped; if none can be read, the exit code is 2.
     """
-    from hicp_lib.detectors.registry import DETECTORS, describe, make_detector
+    from hicp_lib.detectors.registry import describe, make_detector
     from hicp_lib.detectors.runtime.to_file import detect_to_file, open_dataset, open_pictures
     from hicp_lib.formats.detection_files import refuse_other_suffix
 
@@ -212,12 +212,11 @@ def detect(
     if source is None or (dataset_dir and images_dir):
         raise click.UsageError("Give either --dataset DIR or --images DIR.", click.get_current_context())
     refuse_other_suffix(out)
-    needs_model = detector in DETECTORS and DETECTORS[detector].needs_model
-    # Kept until the end: the runs share its open network.
-    made = make_detector(detector, **given(**chosen)) if needs_model else None
+    options = given(**chosen)
     pictures = open_pictures(source) if dataset_dir is None else open_dataset(source)
-    options = {"workers": workers, "strict": strict} | given(**chosen)
+    made = make_detector(detector, **options)  # kept until the end: the runs share its open network
     lines = partial(say, err=False) if by_image else None
+    options |= {"workers": workers, "strict": strict}
     n_people, n_images, n_broken = detect_to_file(detector, pictures, out, say, lines, **options)
     passed_over = f"; {n_broken} could not be read" * bool(n_broken)
     click.echo(f"{out}: {n_people} people in {n_images} images{passed_over}")
@@ -225,8 +224,7 @@ def detect(
         images = shlex.quote(str(source if dataset_dir is None else source / "images"))
         page = shlex.quote(str(out.with_suffix(".html")))
         click.echo(f"look: hicp draw --detections {shlex.quote(str(out))} --images {images} --out {page}")
-    if made is not None:
-        tell_assumed(describe(made))
+    tell_assumed(describe(made))
 
 
 @hicp.command("import")
@@ -296,8 +294,9 @@ def evaluate(
     people = read_annotations(annotations, keypoint_map)
     found = read_detections(detections, people)
     _tell_notes(annotations, people.notes, area)
-    options = {"area": area} | ({"sigmas": sigmas} if sigmas else {})
-    judged = judgement.judge(people, found, [group] if group else GROUPS, by_image, seed, **options)
+    options = {"area": area} | ({} if sigmas is None else {"sigmas": sigmas})
+    groups = GROUPS if group is None else [group]
+    judged = judgement.judge(people, found, groups, by_image, seed, **options)
     if out is not None:
         judgement.write_judgement(out, judged)
     if as_json:
@@ -371,8 +370,8 @@ def report(
 @hicp.command()
 def doctor() -> int:
     """Check the installation: one line each, with the remedy."""
-    from hicp_lib.cli.doctor import FAIL, run_checks
+    from hicp_lib.cli.doctor import run_checks
 
     checks = run_checks()
     click.echo("\n".join(map(str, checks)))
-    return 2 if any(check.status == FAIL for check in checks) else 0
+    return 2 if any(check.is_ok is False for check in checks) else 0

@@ -16,9 +16,11 @@ _READ_OF_FOLDERS = ("annotations.json", "truth.parquet", "joints.parquet", "clic
 
 
 class _Path(click.Path):
-    """A path; refuses an input that is also the output, `out`."""
+    """A path; refuses an empty one, and an input that is also the output, `out`."""
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Path:
+        if value == "":  # as of a variable that is not set; it would be the working folder
+            self.fail("it is empty; give a path.", param, ctx)
         path = Path(str(super().convert(value, param, ctx)))
         try:
             path.stat()

@@ -4,22 +4,19 @@
 process, since a native library may abort or hang.
 """
 
+import json
 import sys
 from collections.abc import Callable
 from functools import partial
-from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 
 from hicp_lib.core.children import end_with
+from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import one_line
 from hicp_lib.core.extras import MissingPartError
 from hicp_lib.core.images import read_image
 from hicp_lib.detectors.registry import DETECTORS, default_detector_names, make_detector
-
-EXIT_FAILED, EXIT_ABSENT = 1, 3
-"""Exit codes if the trial failed, and if an optional part is not installed."""
 
 
 def probes() -> dict[str, Callable[[], str]]:
@@ -32,19 +29,9 @@ def probes() -> dict[str, Callable[[], str]]:
 
 
 def _detect(names: list[str]) -> str:
-    picture, shown = _picture()
-    found = [len(make_detector(name).detect(picture)) for name in names]
-    return f"in {shown}: {', '.join(map(str, found))}"
-
-
-def _picture() -> tuple[np.ndarray, str]:
-    """A photograph of a person that Matplotlib ships, or without it a plain image."""
-    if find_spec("matplotlib") is None:
-        return np.full((480, 640, 3), 128, np.uint8), "a plain picture"
-    import matplotlib
-
-    path = Path(matplotlib.get_data_path()) / "sample_data" / "grace_hopper.jpg"
-    return read_image(path), "a photograph of one person"
+    photograph = read_image(DATA_DIR / "photograph.jpg")
+    found = [len(make_detector(name).detect(photograph)) for name in names]
+    return f"in a photograph of one person: {', '.join(map(str, found))}"
 
 
 def _render() -> str:
@@ -65,19 +52,18 @@ def _control() -> str:
     return f"{len(controller.velocities(home, []))} joint velocities"
 
 
-def main(name: str) -> int:
-    """Run one trial; prints its result in one line."""
+def main(name: str) -> None:
+    """Run one trial; prints in JSON whether it worked, null without its part, and a line on it."""
     end_with(0)
+    is_ok: bool | None = True
     try:
-        print(probes()[name]())
+        finding = probes()[name]()
     except MissingPartError as error:
-        print(error)
-        return EXIT_ABSENT
+        is_ok, finding = None, str(error)
     except Exception as error:  # a broken library may raise anything
-        print(one_line(error))
-        return EXIT_FAILED
-    return 0
+        is_ok, finding = False, one_line(error)
+    print(json.dumps([is_ok, finding]))
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    main(sys.argv[1])

@@ -147,6 +147,7 @@ def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> Non
 @worker_options("Threads")
 def lift(folder: Path, detector: str, method: str, out: Path, workers: int | str | None, **chosen) -> None:
     """Find people in a recording, and lift their keypoints to the robot's base frame."""
+    from hicp_lib.detectors.registry import make_detector
     from hicp_lib.detectors.runtime.results import detections_of
     from hicp_lib.detectors.runtime.run import detect_images
     from hicp_lib.formats.detection_files import refuse_other_suffix
@@ -155,7 +156,9 @@ def lift(folder: Path, detector: str, method: str, out: Path, workers: int | str
 
     refuse_other_suffix(out, (".parquet", ".csv"))
     recording = open_recording(folder)
-    found = detect_images(detector, dict(enumerate(recording.rgb_paths)), workers, **given(**chosen))
+    options = given(**chosen)
+    make_detector(detector, **options)  # refuses what is none of its options
+    found = detect_images(detector, dict(enumerate(recording.rgb_paths)), workers, **options)
     table = lift_recording(recording, list(detections_of(found).values()), method)
     write_table(out, table)
     n_lifted = table["x_m"].notna().sum()

@@ -11,11 +11,10 @@ import json
 import re
 import sys
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import cache
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -67,13 +66,13 @@ class _Module:
     data: frozenset[str]
 
 
-def key(entry_points: Sequence[Any], *, without: Sequence[str] = (), **inputs: Any) -> str:
+def key(entry_points: Sequence[Callable], *, without: Sequence[str] = (), **inputs: Any) -> str:
     """SHA-256 of everything a result depends on.
 
     Parameters
     ----------
-    entry_points : sequence of callable or module or str
-        What makes the result. All code that they import, directly or indirectly, is part of the key.
+    entry_points : sequence of callable
+        What makes the result. All code that their modules import, directly or indirectly, is part of the key.
     without : sequence of str
         Names of modules to leave out: their effect on the result is described by `inputs`.
     **inputs : any
@@ -91,14 +90,14 @@ def key(entry_points: Sequence[Any], *, without: Sequence[str] = (), **inputs: A
     >>> one == key([sha256_bytes], n_frames=3), one == key([sha256_bytes], n_frames=4)
     (True, False)
     """
-    names = tuple(sorted({_module_name(entry) for entry in entry_points}))
-    return digest([asdict(running_code(names, tuple(without))), content(inputs)])
+    names = sorted({entry.__module__ for entry in entry_points})
+    return digest([asdict(running_code(tuple(names), tuple(without))), content(inputs)])
 
 
 @cache  # a process runs the code that it loaded first, even if the files change
 def running_code(names: tuple[str, ...], without: tuple[str, ...] = ()) -> Code:
     """As `code`, for the code that this process runs."""
-    return code(names, without=without)
+    return code(names, without)
 
 
 def code_identity(*names: str) -> dict[str, Any]:
@@ -117,13 +116,7 @@ def code_identity(*names: str) -> dict[str, Any]:
     return {"code": [digest(found.modules), digest(found.data)], "libraries": found.libraries}
 
 
-def code(
-    names: Iterable[str],
-    *,
-    without: Sequence[str] = (),
-    library: Path | None = None,
-    data: Path | None = None,
-) -> Code:
+def code(names: Iterable[str], without: Sequence[str] = ()) -> Code:
     """The import closure of modules of the library, with the data and the libraries it uses.
 
     Parameters
@@ -132,8 +125,6 @@ def code(
         Modules; one that is not part of this library counts as another library.
     without : sequence of str
         Modules to leave out, together with what only they import.
-    library, data : Path, optional
-        Folders of the library's code and data, if not those of the running library.
 
     Raises
     ------
@@ -145,13 +136,12 @@ def code(
     >>> sorted(code(["hicp_lib.core.errors"]).modules)
     ['hicp_lib', 'hicp_lib.core', 'hicp_lib.core.errors']
     """
-    library = library or LIBRARY_DIR
     waiting, modules, others = list(names), {}, set()
     while waiting:
         name = waiting.pop()
         if name in modules or name in without:
             continue
-        path = _path(name, library)
+        path = _path(name)
         if path is not None:
             modules[name] = _read(path, *_state(path))
             waiting += [name.rpartition(".")[0], *modules[name].imports]
@@ -163,7 +153,7 @@ def code(
     return Code(
         # Sorted, since keys depend on their order, and that of a set differs from process to process.
         {name: modules[name].sha256 for name in sorted(modules)},
-        _data_sha256(patterns, data or DATA_DIR),
+        _data_sha256(patterns),
         {name: _version(name) for name in sorted(others - sys.stdlib_module_names)},
     )
 
@@ -176,7 +166,7 @@ def imports_of(source: str | bytes) -> frozenset[str]:
     >>> sorted(imports_of("import os.path\\nfrom json import loads"))
     ['json', 'json.loads', 'os.path']
     """
-    return frozenset(name for statement in _imports(syntax_tree(source)) for name in _imported(statement))
+    return frozenset(_imported(syntax_tree(source)))
 
 
 def syntax_tree(source: str | bytes) -> ast.Module:
@@ -303,18 +293,12 @@ def files_below(folder: Path, above: frozenset[Path] = frozenset()) -> Iterator[
             yield path
 
 
-def _module_name(entry: Any) -> str:
-    if isinstance(entry, str):
-        return entry
-    return entry.__name__ if isinstance(entry, ModuleType) else entry.__module__
-
-
-def _path(name: str, library: Path) -> Path | None:
+def _path(name: str) -> Path | None:
     """The file of a module of the library; None if there is no such module."""
     parts = name.split(".")
     if parts[0] != "hicp_lib":
         return None
-    path = library.joinpath(*parts[1:])
+    path = LIBRARY_DIR.joinpath(*parts[1:])
     file = path / "__init__.py" if path.is_dir() else path.with_name(f"{path.name}.py")
     return file if file.is_file() else None
 
@@ -330,32 +314,27 @@ def _read(path: Path, *state: int) -> _Module:
     return _Module(sha256_bytes(source), names, data)
 
 
-def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
+def _imported(tree: ast.AST) -> Iterator[str]:
     for node in ast.iter_child_nodes(tree):
-        if isinstance(node, (ast.Import, ast.ImportFrom)):
-            yield node
+        if isinstance(node, ast.ImportFrom):
+            yield str(node.module)
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
-            yield from (found for other in node.orelse for found in _imports(ast.Module([other], [])))
+            yield from _imported(ast.Module(node.orelse, []))
         elif not isinstance(node, ast.expr):
-            yield from _imports(node)
+            yield from _imported(node)
 
 
-def _imported(statement: ast.Import | ast.ImportFrom) -> Iterator[str]:
-    if isinstance(statement, ast.ImportFrom):
-        yield str(statement.module)
-        yield from (f"{statement.module}.{alias.name}" for alias in statement.names)
-    else:
-        yield from (alias.name for alias in statement.names)
-
-
-def _data_sha256(patterns: Iterable[str], data: Path) -> dict[str, str]:
-    paths: set[Path] = set()
+def _data_sha256(patterns: Iterable[str]) -> dict[str, str]:
+    paths, reference = set[Path](), DATA_DIR / REFERENCE_DIR.name
     for pattern in patterns:
-        found = [p for p in data.glob(pattern) if p.is_file() and data / REFERENCE_DIR.name not in p.parents]
+        found = [path for path in DATA_DIR.glob(pattern) if path.is_file() and reference not in path.parents]
         if not found:
-            raise InputError(f"{data / pattern}: is missing, and a result depends on it; reinstall hicp")
+            raise InputError(f"{DATA_DIR / pattern}: is missing, and a result depends on it; reinstall hicp")
         paths.update(found)
-    return {path.relative_to(data).as_posix(): _file_sha256(path, *_state(path)) for path in sorted(paths)}
+    return {p.relative_to(DATA_DIR).as_posix(): _file_sha256(p, *_state(p)) for p in sorted(paths)}
 
 
 def _state(path: Path) -> tuple[int, int]:

@@ -23,7 +23,8 @@ def needs(extra: str) -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
-        raise _missing(str(error.name), extra) from None
+        remedy = f"in hicp's checkout run: pip install '.[{extra}]'"
+        raise MissingPartError(f"{error.name} is not installed, and this needs it; {remedy}") from None
 
 
 def require(extra: str, *modules: str) -> None:
@@ -34,12 +35,7 @@ def require(extra: str, *modules: str) -> None:
     MissingPartError
         If one of them is not installed.
     """
-    for module in modules:
-        if find_spec(module) is None:
-            raise _missing(module, extra)
-
-
-def _missing(module: str, extra: str) -> MissingPartError:
-    return MissingPartError(
-        f"{module} is not installed, and this needs it; in hicp's checkout run: pip install '.[{extra}]'"
-    )
+    with needs(extra):
+        for module in modules:
+            if find_spec(module) is None:
+                raise ModuleNotFoundError(name=module)

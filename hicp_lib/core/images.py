@@ -24,7 +24,6 @@ MAX_PIXELS = 100e6
 _MAX_SCANS = 15
 _FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "JPEG2000", "PPM")  # as Pillow calls them
 Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom exclusive
-_EXIF = b"Exif", b"eXIf", b"EXIF"  # of JPEG, PNG and WebP
 
 
 def read_image(path: str | Path) -> np.ndarray:
@@ -168,7 +167,7 @@ def as_seen(pixels: np.ndarray, flag: int) -> np.ndarray:
 
 
 def note_rotation(content: bytes, name: str, flagged: dict[str, int]) -> None:
-    """Add an image to those with a rotation flag, if it has one; formats without EXIF are not opened.
+    """Add an image to those with a rotation flag, if it has one.
 
     Parameters
     ----------
@@ -178,7 +177,7 @@ def note_rotation(content: bytes, name: str, flagged: dict[str, int]) -> None:
     flagged : dict of str to int
         Flags by name.
     """
-    if any(mark in content for mark in _EXIF) and (flag := image_header(BytesIO(content))[2]) != 1:
+    if (flag := image_header(BytesIO(content))[2]) != 1:
         flagged[name] = flag
 
 

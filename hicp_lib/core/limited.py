@@ -23,7 +23,6 @@ _LEAST_S, _S_PER_BYTE, _MOST_S_PER_BYTE = 4.0, 1e-6, 1e-4  # of computing; the l
 _LEAST_BYTES, _BYTES_PER_BYTE = 800 * 2**20, 40  # of memory
 _PROGRAM = """import sys; at = [*("-packages" in folder for folder in sys.path), True].index(True)
 sys.path.insert(at, sys.argv[1]); from hicp_lib.core import limited; limited.serve()"""
-_PART, _END = b"p", b"e"  # kinds of messages, of which each is kind, size and content
 _patience_s: list[float] = []  # of a limited process: how long one step may compute
 RAISE = f"{LIMITS_VARIABLE}=4 in the environment allows four times as much"
 """The end of a message about a limit."""
@@ -114,17 +113,19 @@ def limited_parts(
         with subprocess.Popen(command, env=environment, **pipes) as process:
             answers = cast(IO[bytes], process.stdout)
             try:
-                while (message := _received(answers)) and message[0] == _PART:
-                    yield message[1]
+                while len(size := answers.read(8)) == 8:
+                    part = answers.read(int.from_bytes(size, "little"))
+                    if len(part) == int.from_bytes(size, "little"):  # else it ended within
+                        yield part
                 code = process.wait()
             finally:
                 process.kill()
         errors.seek(max(0, errors.seek(0, os.SEEK_END) - 4096))
         last = errors.read().decode(errors="replace").strip().rpartition("\n")[2]
-    if message and not code:
-        if refusal := json.loads(message[1]):
-            raise InputError(refusal)
-        return
+        if not code and (end := Path(folder, "end")).exists():
+            if refusal := json.loads(end.read_text()):
+                raise InputError(refusal)
+            return
     took_long = code in (-signal.SIGXCPU, -signal.SIGPROF)
     if took_long or "MemoryError" in last:
         most = f"{limits[0]:.1f} s" if took_long else f"{limits[2] / 1e9:.2g} GB of memory"
@@ -133,20 +134,12 @@ def limited_parts(
     raise InputError(f"{path}: its reader gave up ({how}); is it damaged or cut off?")
 
 
-def _received(stream: IO[bytes]) -> tuple[bytes, bytes] | None:
-    """Kind and content of the next message; None where there is none, or not a whole one."""
-    head = stream.read(9)
-    size = int.from_bytes(head[1:], "little")
-    content = stream.read(size) if len(head) == 9 else b""
-    return (head[:1], content) if len(head) == 9 and len(content) == size else None
-
-
 def serve() -> None:
-    """Main program of the process: run the function, write its result to standard output."""
+    """Main program of the process: run the function, write what it gives, each part after its size."""
     end_with(0)
-    answers = os.dup(1)
-    os.dup2(2, 1)  # output printed by libraries must not mix with the result
-    module, name, arguments, limits = json.loads(Path(os.environ["TMPDIR"], "question").read_text())
+    answers, folder = os.dup(1), Path(os.environ["TMPDIR"])
+    os.dup2(2, 1)  # output printed by libraries must not mix with the parts
+    module, name, arguments, limits = json.loads((folder / "question").read_text())
     function = getattr(import_module(module), name)
     with suppress(ImportError, ValueError, OSError):  # no such limits on this system
         import resource
@@ -157,20 +150,16 @@ def serve() -> None:
             resource.setrlimit(getattr(resource, f"RLIMIT_{name}"), (int(most), int(most) + 1))
     _patience_s.append(limits[0])
     went_on()
+    refusal = None
     with open(answers, "wb") as file:
-
-        def send(kind: bytes, content: bytes) -> None:
-            file.writelines((kind, len(content).to_bytes(8, "little"), content))
-
-        refusal = None
         try:
             answer = function(*arguments)
             for part in answer if isinstance(answer, Iterator) else [json.dumps(answer).encode()]:
-                send(_PART, part)
+                file.writelines((len(part).to_bytes(8, "little"), part))
                 went_on()
         except InputError as error:
             refusal = str(error)
-        send(_END, json.dumps(refusal).encode())
+    (folder / "end").write_text(json.dumps(refusal))
 
 
 def went_on() -> None:

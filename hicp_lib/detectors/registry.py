@@ -120,7 +120,7 @@ def command_to_use(name: str) -> str:
     return f"hicp models use --detector {name} --model FILE.onnx"
 
 
-def make_detector(name: str, **options) -> Detector:
+def make_detector(name: str, /, **options) -> Detector:
     """A detector ready to run.
 
     A detector that needs a model and gets none uses the registered one (`hicp_lib.detectors.weights.user`).
@@ -203,6 +203,8 @@ def _check_options(name: str, detector_class: type, options: dict[str, Any]) -> 
     for option, value in options.items():
         refuse_unknown(f"detector {name!r}: option", option, kinds)
         wrong = f"detector {name!r}: option {option!r} is {value!r}"
+        if value == "":
+            raise InputError(f"detector {name!r}: option {option!r} is empty; give a value, or leave it out")
         if not isinstance(value, kinds[option]) or (isinstance(value, bool) and bool not in kinds[option]):
             raise InputError(f"{wrong}; expected {' or '.join(kind.__name__ for kind in kinds[option])}")
         least, most = next(of for end, of in _BOUNDS.items() if option.endswith(end))

@@ -43,10 +43,12 @@ KINDS = {
 
 
 @pytest.fixture
-def copy(tmp_path) -> Path:
-    """A copy of the library and its data."""
+def copy(tmp_path, monkeypatch) -> Path:
+    """A copy of the library and its data, of which keys are made."""
     shutil.copytree(LIBRARY_DIR, tmp_path / "hicp_lib", ignore=shutil.ignore_patterns("__pycache__", "data"))
     shutil.copytree(DATA_DIR, tmp_path / "data")
+    monkeypatch.setattr(cache, "LIBRARY_DIR", tmp_path / "hicp_lib")
+    monkeypatch.setattr(cache, "DATA_DIR", tmp_path / "data")
     return tmp_path
 
 
@@ -59,48 +61,45 @@ def change_one_byte(path: Path, rng: random.Random) -> bytes:
     return content
 
 
-def module_files(names, library: Path) -> list[Path]:
-    paths = [cache._path(name, library) for name in names]
+def module_files(names) -> list[Path]:
+    paths = [cache._path(name) for name in names]
     return [path for path in paths if path.stat().st_size]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_one_byte_of_the_code_or_the_data_changes_the_key_and_none_outside_does(kind, copy):
+def test_one_byte_of_the_code_or_the_data_changes_the_key_and_none_outside_does(kind, request):
     names, without = KINDS[kind]
-
-    def found():
-        return code(names, without=without, library=copy / "hicp_lib", data=copy / "data")
-
-    before, rng = found(), random.Random(kind)
-    assert before == code(names, without=without)
-    inside = module_files(before.modules, copy / "hicp_lib") + [copy / "data" / name for name in before.data]
+    original, copy = code(names, without), request.getfixturevalue("copy")
+    before, rng = code(names, without), random.Random(kind)
+    assert before == original
+    inside = module_files(before.modules) + [copy / "data" / name for name in before.data]
     for path in rng.sample(inside, min(12, len(inside))):
         if path.suffix == ".py":  # a comment: the code stays code
             content = path.read_bytes()
             path.write_bytes(content + b"#")
         else:
             content = change_one_byte(path, rng)
-        assert found() != before, path
+        assert code(names, without) != before, path
         path.write_bytes(content)
     outside = [p for p in (copy / "hicp_lib").rglob("*.py") if p not in inside and p.stat().st_size]
     for path in rng.sample(outside, min(12, len(outside))):
         change_one_byte(path, rng)
-    assert found() == before
+    assert code(names, without) == before
 
 
 def test_data_that_are_named_and_not_there_are_told(copy):
     (copy / "data" / "icub.json").unlink()
     with pytest.raises(InputError, match=r"icub\.json: is missing, and a result depends on it"):
-        code(["hicp_lib.robot.tables"], library=copy / "hicp_lib", data=copy / "data")
+        code(["hicp_lib.robot.tables"])
 
 
 def test_no_result_follows_from_a_reference_run(copy):
     names = ["hicp_lib.study.provenance", "hicp_lib.report.build"]
-    before = code(names, library=copy / "hicp_lib", data=copy / "data")
+    before = code(names)
     assert "identities.json" in before.data
     (copy / "data" / "reference" / "full" / "02_x").mkdir(parents=True)
     (copy / "data" / "reference" / "full" / "02_x" / "values.json").write_text("{}")
-    assert code(names, library=copy / "hicp_lib", data=copy / "data") == before
+    assert code(names) == before
 
 
 def test_another_detector_makes_nobody_look_again():
@@ -109,7 +108,7 @@ def test_another_detector_makes_nobody_look_again():
     assert "hicp_lib.detectors.onnx.mmpose" not in of_mediapipe
     assert not any("mediapipe" in name or "openpose" in name for name in of_mmpose)
     names, without = KINDS["avoidance"]
-    assert "hicp_lib.detectors.onnx.mmpose" not in code(names, without=without).modules
+    assert "hicp_lib.detectors.onnx.mmpose" not in code(names, without).modules
     assert "hicp_lib.detectors.onnx.mmpose" in code(names).modules
 
 
@@ -153,8 +152,6 @@ def test_200_random_changes_leave_no_stale_page(copy, monkeypatch):
     shutil.copy(CHECKOUT / "environment.lock", copy)
     from hicp_lib.study import provenance
 
-    monkeypatch.setattr(cache, "LIBRARY_DIR", copy / "hicp_lib")
-    monkeypatch.setattr(cache, "DATA_DIR", copy / "data")
     monkeypatch.setattr(provenance, "LOCK_PATH", copy / "environment.lock")
     loaded = {n.name: loaded_by(n.imports) for n in read_notebooks(copy / "notebooks")}
 

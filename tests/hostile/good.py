@@ -21,6 +21,7 @@ from tests.recordings.ros_bags import write_bag
 IMPORT = "import --format coco --predictions results.json --annotations annotations.json"
 EVALUATE = "evaluate --annotations annotations.json --detections results.json"
 FIT = "calibration fit --annotations annotations.json --detections results.json"
+APPLY = "calibration apply --calibrations calibrations.csv --detections results.json"
 DETECT = "detect --detector movenet-lightning --images pictures"
 MMPOSE = "detect --detector mmpose --model model.onnx --images pictures"
 CREATE = "dataset create --annotations annotations.json --images pictures"
@@ -60,10 +61,11 @@ def annotations() -> dict:
 
 def results() -> list[dict]:
     """COCO results that find everybody."""
-    return [
-        {"image_id": person["image_id"], "category_id": 1, "score": 0.9, "keypoints": person["keypoints"]}
-        for person in annotations()["annotations"]
-    ]
+    people = annotations()["annotations"]
+    kept = [{key: person[key] for key in ("image_id", "category_id", "keypoints")} for person in people]
+    for person in kept:
+        person["keypoints"][2::3] = [0.9] * 136
+    return [person | {"score": 0.9} for person in kept]
 
 
 def make_good(folder: Path) -> Path:
@@ -73,12 +75,12 @@ def make_good(folder: Path) -> Path:
         cv2.imwrite(str(folder / "pictures" / name), picture(seed))
     (folder / "annotations.json").write_text(json.dumps(annotations()))
     (folder / "results.json").write_text(json.dumps(results()))
-    (folder / "map.json").write_text(json.dumps({"tail": None}))
+    (folder / "map.json").write_text(json.dumps({NAMES[1]: None}))
     _other_tools(folder)
     _recordings(folder)
     colour_maps_model(folder / "model.onnx", (192, 256), 133)
     write_video(folder / "clip.avi")
-    curves = {"detector": "d", "group": "body", "score": [0.0, 1.0], "hit_rate": [0.1, 0.9]}
+    curves = {"detector": "d", "group": "body", "score": [0.0, 1.0], "rate": [0.1, 0.9]}
     pd.DataFrame(curves).to_csv(folder / "calibrations.csv", index=False)
     return folder
 
@@ -190,7 +192,7 @@ READERS: dict[str, tuple[str, str]] = {
         "annotations.json",
     ),
     "calibration apply": (
-        "calibration apply --calibrations calibrations.csv --detections results.json --out out.json",
+        f"{APPLY} --out out.json",
         "calibrations.csv",
     ),
     "import ros1": ("record import out --bag x.bag", "x.bag"),

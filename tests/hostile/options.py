@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tests.hostile.case import Case
-from tests.hostile.good import CREATE, DETECT, DRAW, EVALUATE, FIT, IMPORT, IMPORT_OPEN3D, LIFT, MMPOSE
+from tests.hostile.good import APPLY, CREATE, DETECT, DRAW, EVALUATE, FIT, IMPORT, IMPORT_OPEN3D, LIFT, MMPOSE
 
 ANY = "detect --images pictures --out out.json --detector"
 NUMBERS = ("nan", "inf", "-inf", "-1", "NaN", "Infinity", "1e400", "", "text", "[1]", "null", "true", "1e300",
@@ -17,7 +17,7 @@ OF_DETECTORS = (
     ("mediapipe-hands", "num_hands", ()), ("mediapipe-pose", "num_poses", ()),
     ("movenet-lightning", "padding", ()), ("movenet-lightning", "person_min_score", ()),
     ("movenet-lightning", "threads", ()), ("movenet-multipose", "min_person_score", ()),
-    ("openpose-mobilenet", "net_height", ()), ("posenet-mobilenet", "min_score", ()),
+    ("openpose-mobilenet", "net_height_px", ()), ("posenet", "min_root_score", ()),
     ("mmpose --model model.onnx", "score_scale", ("null",)),
     ("mmpose --model model.onnx", "input_size_px", ("null",)),
     ("mmpose --model model.onnx", "flip_test", ("true",)),
@@ -27,7 +27,7 @@ MORE = {"min_score": ("5",), "num_hands": ("0", "1.5", "1000000000"),
         "num_people": ("0", "1.5", "1000000000"),
         "num_poses": ("0", "1.5"), "threads": ("0", "1.5", "1000000000"),
         "padding": ("0", "1e9")}  # fmt: skip
-NULL_IS_DEFAULT = ("person_min_score", "person_max_overlap", "net_height", "score_scale", "input_size_px")
+NULL_IS_DEFAULT = ("person_min_score", "person_max_overlap", "score_scale", "input_size_px")
 MAY_BE_MANY = ("--seed", "--limit", "--min-pixels", "--workers", "--score-scale", "--rate", "--depth-scale",
                "--subject")  # fmt: skip
 OF_COMMANDS = {
@@ -51,6 +51,7 @@ TEXT_OPTIONS = {
     "--format": "import --predictions results.json --annotations annotations.json --out out.json",
     "--layout": "export --detections results.json --format coco --out out.json",
     "--boxes": f"{DETECT} --out out.json",
+    "--detector": f"{APPLY} --out out.json",
     "--method": f"{LIFT} --out out.parquet",
     "--depth-camera": "record simulate mocap out --n-frames 1",
     "--people": "scenes render out --n 1",
@@ -71,6 +72,13 @@ TEXT_OPTIONS = {
     "--color-topic": "record import out --bag x.bag",
     "--recording": "lift --detector movenet-lightning --out out.parquet",
 }
+TEXTS_OF_DETECTORS = {
+    "movenet-lightning": ("boxes", "person_model"),
+    "mediapipe-pose": ("model",),
+    "mmpose --model model.onnx": ("boxes", "person_model", "person_family", "hand"),
+    "alphapose --model model.onnx": ("decoding",),
+    "detectron2 --model model.onnx": ("family",),
+}
 OUTPUTS = {
     "detect": DETECT,
     "create": CREATE,
@@ -81,9 +89,22 @@ OUTPUTS = {
     "lift": LIFT,
     "evaluate": EVALUATE,
 }
-PLACES = {"nowhere": "", "of 5,000 characters": "a" * 5000 + ".json", "below a file": "results.json/out.json",
-          "in /proc": "/proc/out.json", "in /dev": "/dev/null/out.json",
+SUFFIXES = {"draw": ".html", "lift": ".csv"}  # of what the others write: .json
+PLACES = {"nowhere": "", "of 5,000 characters": "a" * 5000 + "{}", "below a file": "results.json/out{}",
+          "in /proc": "/proc/out{}", "in /dev": "/dev/null/out{}",
           "with a line": "out\n.xyz"}  # fmt: skip
+# What the library calls its own arguments.
+NO_OPTIONS = "name images workers self detector boxes_px progress options out tell".split()
+WITH_DETECTORS = {
+    "detect": f"{DETECT} --out out.json",
+    "lift": f"{LIFT} --out out.parquet",
+    "models show": "models show --detector movenet-lightning",
+    "models use": "models use --detector mmpose --model model.onnx",
+    "combined": f"{ANY} combined:movenet-lightning+mediapipe-hands",
+}
+EMPTY_FOLDERS = ("scenes render '' --n 1", "record simulate mocap '' --n-frames 1", "record check ''",
+                 "inspect ''", "record import '' --bag x.bag",
+                 "report --profile quick --results ''")  # fmt: skip
 PARAMETERS = {"detectors": ("", "[]", "nonsense", '["mediapipe", 7]', "NaN", "mediapipe,mediapipe"),
               "seed": ("nan", "inf", "-1", "1.5", "", "text", "1e300"),
               "n_images": ("0", "-1", "nan", "1e9", "inf", "", "1.5")}  # fmt: skip
@@ -149,9 +170,18 @@ def cases() -> Iterator[Case]:
         for kind, place in PLACES.items():
             yield Case(
                 f"option: {name} --out {kind}",
-                [*command.split(), "--out", place],
+                [*command.split(), "--out", place.format(SUFFIXES.get(name, ".json"))],
                 exits=(0, 2) if "line" in kind else (2,),
             )
+    for name, command in WITH_DETECTORS.items():
+        for option in NO_OPTIONS:
+            yield Case(f"option: {name} -o {option}", [*command.split(), "-o", option, "3"])
+    for command in EMPTY_FOLDERS:
+        yield Case(f"option: {command}", command)
+    for detector, options in TEXTS_OF_DETECTORS.items():
+        for option in options:
+            command = [*f"{ANY} {detector} -o {option}".split(), ""]
+            yield Case(f"option: {detector.split()[0]} {option} ''", command)
     for parameter, values in PARAMETERS.items():
         for value in values:
             command = ["report", "--profile", "quick", "--results", "out", "-p", parameter, value]

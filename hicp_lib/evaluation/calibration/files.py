@@ -69,7 +69,7 @@ def write_calibrations(path: str | Path, table: pd.DataFrame) -> None:
     write_bytes(path, table.to_csv(index=False).encode())
 
 
-def read_calibrations(path: str | Path, detector: str = "") -> dict[str, Calibration]:
+def read_calibrations(path: str | Path, detector: str | None = None) -> dict[str, Calibration]:
     """Read the calibrations of one detector.
 
     Parameters
@@ -77,7 +77,7 @@ def read_calibrations(path: str | Path, detector: str = "") -> dict[str, Calibra
     path : str or Path
         CSV, or Parquet where the name ends in `.parquet`.
     detector : str, optional
-        Its name; may be empty if the file has only one.
+        Its name; may be left out if the file has only one.
 
     Returns
     -------
@@ -92,9 +92,12 @@ def read_calibrations(path: str | Path, detector: str = "") -> dict[str, Calibra
     path = Path(path)
     table = read_table(path, _COLUMNS)
     names = table["detector"].astype(str).unique().tolist()
-    if detector not in names and (detector or len(names) != 1):
-        raise InputError(f"{path}: detector {detector!r} is not in it; expected one of: {', '.join(names)}")
-    rows = table[table["detector"].astype(str) == (detector or names[0])]
+    if detector is None and len(names) == 1:
+        detector = names[0]
+    if detector not in names:
+        asked = "no detector is named" if detector is None else f"detector {detector!r} is not in it"
+        raise InputError(f"{path}: {asked}; expected one of: {', '.join(names)}")
+    rows = table[table["detector"].astype(str) == detector]
     _check(path, rows)
     return {group: calibration for (_, group), calibration in calibrations_of(rows).items()}
 

@@ -84,16 +84,15 @@ def scenario(name: str, number: int = 0) -> Scenario:
     >>> scenario("relative-upper").n_frames, scenario("mocap@azure-kinect").depth_camera.width_px
     (100, 640)
     """
-    base, _, camera = name.partition("@")
-    for kind, known, chosen in (
-        ("scenario", SCENARIOS, base), ("depth camera", DEPTH_CAMERAS, camera or "d435")
-    ):  # fmt: skip
+    base, at, camera = name.partition("@")
+    camera = camera if at else "d435"
+    for kind, known, chosen in (("scenario", SCENARIOS, base), ("depth camera", DEPTH_CAMERAS, camera)):
         if chosen not in known:
             raise InputError(f"no {kind} {chosen!r}; choose one of {', '.join(known)}")
     plan = SCENARIOS[base]
     first = _POSES_APART * number % plan.n_frames
-    depth_camera = DEPTH_CAMERAS[camera or "d435"]
-    return replace(plan, depth_camera=depth_camera, head_rad=lambda n: plan.head_rad(first + n)[first:])
+    seen_by = DEPTH_CAMERAS[camera]
+    return replace(plan, depth_camera=seen_by, head_rad=lambda n: plan.head_rad(first + n)[first:])
 
 
 @memoised()
