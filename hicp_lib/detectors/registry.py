@@ -179,9 +179,9 @@ def _make_combined(name: str, options: dict) -> Detector:
     for_hands = _HANDS_WITHIN.get(hands, {}) | {
         key.removeprefix("hands_"): value for key, value in options.items() if key.startswith("hands_")
     }
-    if for_hands.get("tracking_hz"):
+    if for_hands.get("tracking_hz") and own.get("looks") != "image":
         wrong = "hands are searched for in parts of an image one after the other, which are no video"
-        raise InputError(f"detector {name!r}: {wrong}; leave out hands_tracking_hz")
+        raise InputError(f"detector {name!r}: {wrong}; leave out hands_tracking_hz, or give looks 'image'")
     for_body = {key: options[key] for key in options if key not in own and not key.startswith("hands_")}
     return combined_class(make_detector(body, **for_body), make_detector(hands, **for_hands), **own)
 

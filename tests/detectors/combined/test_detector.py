@@ -270,3 +270,5 @@ def test_hands_are_not_followed_from_one_part_of_an_image_to_the_next(weights):
         make_detector(name, hands_tracking_hz=30.0)
     assert "\n" not in str(error.value)
     assert make_detector(name, tracking_hz=30.0).settings["body"]["tracking_hz"] == 30.0
+    whole = make_detector(name, looks="image", hands_tracking_hz=30.0)
+    assert whole.settings["hands"]["tracking_hz"] == 30.0
