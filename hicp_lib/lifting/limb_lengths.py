@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.lib.stride_tricks import as_strided
 
 from hicp_lib.core.keypoints import LEFT_HAND
 from hicp_lib.lifting.body_measures import LEVELS, BodyMeasures, found_parents
@@ -42,10 +41,9 @@ class Limbs:
 
         Where the beginning would lie off the grid, any cost stands.
         """
-        last, reach = self.costs[-1].size * (len(self.costs) - 1), len(self.costs) // 2
-        stride, *others = self.costs.strides
-        backwards = self.costs.itemsize - stride, *others
-        return as_strided(self.costs.reshape(-1)[last - reach :], self.costs.shape, backwards)
+        costs, (stride, *others) = self.costs, self.costs.strides
+        first = stride * (len(costs) - 1) - costs.itemsize * (len(costs) // 2)
+        return np.ndarray(costs.shape, costs.dtype, costs, first, (costs.itemsize - stride, *others))
 
 
 def limbs_outwards(
@@ -161,7 +159,8 @@ def _shifted(costs: np.ndarray, reach: int) -> np.ndarray:
     n, n_depths = costs.shape
     padded = np.full((n, n_depths + 2 * reach), np.inf, np.float32)
     padded[:, reach : reach + n_depths] = costs
-    return as_strided(padded, (2 * reach + 1, n, n_depths), (padded.itemsize, *padded.strides))
+    by_step = padded.itemsize, *padded.strides
+    return np.ndarray((2 * reach + 1, n, n_depths), padded.dtype, padded, strides=by_step)
 
 
 def _choose_ends(limbs: Limbs, begins: np.ndarray, costs: np.ndarray) -> np.ndarray:
