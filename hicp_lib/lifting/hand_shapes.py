@@ -196,18 +196,18 @@ class _SeenHand:
     def take(self, some: np.ndarray) -> _SeenHand:
         return replace(self, which=self.which[some], places_m=self.places_m[:, some], costs=self.costs[some])
 
-    def apart_m(self, points_m: np.ndarray, shift_m: np.ndarray | float = 0.0) -> np.ndarray:
-        """Offsets (2, k, ...) of projected points (3, k, ...), then shifted, from the observed positions."""
+    def apart_m(self, points_m: np.ndarray, targets_m: np.ndarray) -> np.ndarray:
+        """Offsets (2, ...) of projected points (3, ...) from their targets (2, ...)."""
         apart_m = points_m[:2] * (self.middle_m / (points_m[2] + self.middle_m))
-        return np.subtract(_beside(self.places_m, points_m) - shift_m, apart_m, out=apart_m)
+        return np.subtract(targets_m, apart_m, out=apart_m)
 
     def look_up(self, behind_m: np.ndarray) -> np.ndarray:
-        """Costs of depths (k, ...) behind the centre."""
+        """Costs of depths (k, ..., ...) behind the centre."""
         per_m, last = 1 / (self.grid_m[1] - self.grid_m[0]), len(self.grid_m) - 1
         place = behind_m - self.grid_m[0]  # in place from here on, as memory access dominates the time
         place *= per_m
         np.clip(np.rint(place, out=place), 0, last, out=place)
-        place += _beside(np.arange(len(self.costs), dtype=np.float32) * (last + 1), behind_m)
+        place += np.arange(len(self.costs), dtype=np.float32)[:, None, None] * (last + 1)
         return self.costs.take(place.astype(np.intp))
 
 
@@ -239,7 +239,7 @@ def _place_palm(seen: _SeenHand, is_right: bool) -> tuple[np.ndarray, ...]:
     """
     turns, total, points_m = _turns(is_right)
     points_m = points_m.take(np.searchsorted(PALM, seen.which), axis=1)
-    apart_m = seen.apart_m(points_m)
+    apart_m = seen.apart_m(points_m, seen.places_m[:, :, None])
     shift_m = apart_m.mean(axis=1)
     apart_m -= shift_m[:, None]
     total = total + _misfits(apart_m, _PALM_SIGMA_M).sum(axis=0)
@@ -249,36 +249,42 @@ def _place_palm(seen: _SeenHand, is_right: bool) -> tuple[np.ndarray, ...]:
     total = total[fitting] + seen.look_up(behind_m).sum(axis=0)
     best = np.argpartition(total, _N_PLACES, axis=None)[:_N_PLACES]
     place, palm = np.unravel_index(best, total.shape)
-    z_m, (palms, places) = z_m[place], np.unique(fitting[palm], return_inverse=True)
-    behind_m = points_m[2][:, palms[places]] + z_m
-    return total.ravel()[best], behind_m, turns[palms], shift_m[:, palms], places, z_m
+    z_m, palm = z_m[place], fitting[palm]
+    some = np.flatnonzero(np.bincount(palm))
+    behind_m = points_m[2][:, palm] + z_m
+    return total.ravel()[best], behind_m, turns[some], shift_m[:, some], np.searchsorted(some, palm), z_m
 
 
 def _bend(
     seen: _SeenHand, turns: np.ndarray, shift_m: np.ndarray, places: np.ndarray, z_m: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fingers on each palm: their costs in the best shapes, (p,), and their depths, (k, p).
+    """Fingers on each palm, as of `_place_palm`: their costs in the best shapes, (p,), and depths, (k, p).
 
     Depths are relative to the apparent centre: the weighted mean over shapes, and the mean of the square.
     """
-    shapes_m = load_hand_shapes()[:, seen.which].swapaxes(0, 1)
-    points_m = _turned(shapes_m.reshape(-1, 3), turns).reshape(3, *shapes_m.shape[:2], -1)
-    cost = _misfits(seen.apart_m(points_m, shift_m[:, None, None]), _FINGER_SIGMA_M)
-    behind_m = points_m[2].take(places, axis=2) + z_m
-    cost = cost.take(places, axis=2) + seen.look_up(behind_m)
-    of = _FINGER_OF[seen.which]
-    first = np.flatnonzero(np.diff(of, prepend=-1))
-    cost = np.stack([finger.sum(axis=0) for finger in np.split(cost, first[1:])])
-    least = cost.min(axis=1, keepdims=True)
-    weights = np.exp((least - cost) / _LIKELY)
-    weights /= weights.sum(axis=1, keepdims=True)
-    weights = weights.repeat(np.diff(first, append=len(of)), axis=0)
-    mean_m, square_m2 = (np.einsum("ksp,ksp->kp", weights, values) for values in (behind_m, behind_m**2))
-    return least.sum(axis=(0, 1)), mean_m, square_m2
+    shapes_m = load_hand_shapes()[:, seen.which].T
+    turned_m = turns.swapaxes(0, 1).reshape(-1, 3) @ shapes_m.reshape(3, -1)
+    turned_m = turned_m.reshape(3, -1, *shapes_m.shape[1:]).swapaxes(1, 2)  # (3, k, q, shapes)
+    targets_m = seen.places_m[..., None] - shift_m[:, None]
+    misfits = _misfits(seen.apart_m(turned_m, targets_m[..., None]), _FINGER_SIGMA_M)
+    behind_m = turned_m[2].take(places, axis=1) + z_m[:, None]
+    finger = _FINGER_OF[seen.which]
+    belongs = (finger == np.arange(len(FINGERS))[:, None]).astype(np.float32)
+    of_palms, of_depths = (
+        (belongs @ costs.reshape(len(finger), -1)).reshape(len(FINGERS), -1, costs.shape[2])
+        for costs in (misfits, seen.look_up(behind_m))
+    )
+    costs = of_palms.take(places, axis=1) + of_depths
+    least = costs.min(axis=2, keepdims=True)
+    weights = np.exp((least - costs) / _LIKELY)
+    weights /= weights.sum(axis=2, keepdims=True)
+    weights = weights[finger]
+    mean_m, square_m2 = (np.einsum("kps,kps->kp", weights, values) for values in (behind_m, behind_m**2))
+    return least.sum(axis=(0, 2)), mean_m, square_m2
 
 
 def _misfits(apart_m: np.ndarray, sigma_m: float) -> np.ndarray:
-    """The costs (k, ...) of offsets (2, k, ...), which are overwritten."""
+    """The costs of offsets (2, ...), which are overwritten."""
     apart_m *= apart_m
     misfit = apart_m[0]
     misfit += apart_m[1]
@@ -289,8 +295,3 @@ def _misfits(apart_m: np.ndarray, sigma_m: float) -> np.ndarray:
 def _turned(points_m: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Points (k, 3) under every rotation (p, 3, 3), shape (3, k, p)."""
     return points_m @ turns.transpose(1, 2, 0)
-
-
-def _beside(values: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Values of keypoints with axes appended, to broadcast with arrays of points."""
-    return values[(..., *[None] * (points.ndim - values.ndim))]
