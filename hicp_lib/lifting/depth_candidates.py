@@ -140,7 +140,7 @@ def depth_costs(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
     step_m = grid_m[1] - grid_m[0]
     reach = int(np.sqrt(_IN_FRONT) * candidates.sigma_m.max(initial=0) / step_m + 0.5)
     nearest = np.rint((depth_m - grid_m[0]) / step_m).astype(int) + 1
-    place = np.clip(nearest + np.arange(-reach, reach + 1)[:, None], 0, len(beyond_m) - 1)
+    place = np.minimum(np.maximum(nearest + np.arange(-reach, reach + 1)[:, None], 0), len(beyond_m) - 1)
     apart = (beyond_m[place] - depth_m) / candidates.sigma_m[keypoint]
     flat = keypoint * len(beyond_m) + place
     np.minimum.at(costs.reshape(-1), flat.ravel(), (apart * apart + cost).ravel())  # fast in one dimension
@@ -171,7 +171,8 @@ def refine_depths(
     agree = abs(candidates.depth_m - chosen_m[:, None]) < within_m
     weights = np.where(agree, np.exp(-2 * candidates.cost), 0)
     total = weights.sum(axis=1)
-    mean_m = (weights * np.nan_to_num(candidates.depth_m)).sum(axis=1) / np.where(total > 0, total, 1)
+    depth_m = np.where(agree, candidates.depth_m, 0)
+    mean_m = (weights * depth_m).sum(axis=1) / np.where(total > 0, total, 1)
     return np.where(total > 0, mean_m, chosen_m), total > 0
 
 
