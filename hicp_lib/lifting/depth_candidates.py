@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from hicp_lib.core.camera import Camera, deproject
-from hicp_lib.core.images import inside
 from hicp_lib.core.keypoints import BODY, INDEX, N_KEYPOINTS
 from hicp_lib.lifting.paper import has_depth
 
@@ -17,6 +16,7 @@ RADIUS_M = np.where(_IS_BODY, 0.022, 0.013)  # radius around a keypoint in which
 _SIGMA_M = np.where(_IS_BODY, 0.010, 0.008)  # a difference in depth that costs 1
 _SIGMA_M[[INDEX["left_wrist"], INDEX["right_wrist"]]] = 0.015
 _SAMPLES = 7  # per side of the neighbourhood
+_STEPS = np.array(np.meshgrid(*[np.linspace(-1, 1, _SAMPLES)] * 2)).reshape(2, -1)
 _STEEP_M = 0.03  # a larger difference between the pixels on both sides is a step in depth
 _ON_STEP = 1.0  # cost of a surface there
 _HIDDEN = np.where(_IS_BODY, 5.0, 2.0)  # cost of a depth behind the nearest surface
@@ -101,13 +101,10 @@ def depth_candidates(
     (array([2.03]), array([[0., 0., 1.]]))
     """
     radius_px = np.maximum(intrinsics.fx_px * RADIUS_M[keypoints] / near_m, 2)
-    steps = np.linspace(-1, 1, _SAMPLES)
-    columns, rows = (
-        np.rint(middle[:, None] + radius_px[:, None] * step.ravel()).astype(int)
-        for middle, step in zip(pixels_px.T, np.meshgrid(steps, steps), strict=True)
-    )
-    surface_m, is_steep = _sample(depth_m, rows, columns)
-    away = (columns - pixels_px[:, :1]) ** 2 + (rows - pixels_px[:, 1:]) ** 2
+    middles_px = pixels_px.T[:, :, None]
+    places = np.rint(middles_px + radius_px[:, None] * _STEPS[:, None]).astype(int)
+    surface_m, is_steep = _sample(depth_m, *places)
+    away = ((places - middles_px) ** 2).sum(axis=0)
     rays = deproject(intrinsics, pixels_px, np.ones(len(pixels_px)))
     deeper_m = below_m[keypoints] / np.linalg.norm(rays, axis=1)
     return Candidates(
@@ -143,7 +140,7 @@ def depth_costs(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
     step_m = grid_m[1] - grid_m[0]
     reach = int(np.sqrt(_IN_FRONT) * candidates.sigma_m.max(initial=0) / step_m + 0.5)
     nearest = np.rint((depth_m - grid_m[0]) / step_m).astype(int) + 1
-    place = np.clip(nearest + np.arange(-reach, reach + 1)[:, None], 0, len(beyond_m) - 1)
+    place = np.minimum(np.maximum(nearest + np.arange(-reach, reach + 1)[:, None], 0), len(beyond_m) - 1)
     apart = (beyond_m[place] - depth_m) / candidates.sigma_m[keypoint]
     flat = keypoint * len(beyond_m) + place
     np.minimum.at(costs.reshape(-1), flat.ravel(), (apart * apart + cost).ravel())  # fast in one dimension
@@ -174,19 +171,21 @@ def refine_depths(
     agree = abs(candidates.depth_m - chosen_m[:, None]) < within_m
     weights = np.where(agree, np.exp(-2 * candidates.cost), 0)
     total = weights.sum(axis=1)
-    mean_m = (weights * np.nan_to_num(candidates.depth_m)).sum(axis=1) / np.where(total > 0, total, 1)
+    depth_m = np.where(agree, candidates.depth_m, 0)
+    mean_m = (weights * depth_m).sum(axis=1) / np.where(total > 0, total, 1)
     return np.where(total > 0, mean_m, chosen_m), total > 0
 
 
-def _sample(depth_m: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _sample(depth_m: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Depth at pixels, NaN where missing, and whether there is a step or hole next to them."""
     height, width = depth_m.shape
-    is_inside = inside(np.stack([columns, rows], axis=-1), (0, 0, width, height))
     # One pixel inside the border, so that there are pixels on all sides.
-    rows, columns = np.clip(rows, 1, height - 2), np.clip(columns, 1, width - 2)
-    surface_m = depth_m[rows, columns]
-    across = abs(depth_m[rows, columns + 1] - depth_m[rows, columns - 1])
-    down = abs(depth_m[rows + 1, columns] - depth_m[rows - 1, columns])
+    near_rows = np.minimum(np.maximum(rows, 1), height - 2)
+    near_columns = np.minimum(np.maximum(columns, 1), width - 2)
+    is_inside = (abs(near_rows - rows) < 2) & (abs(near_columns - columns) < 2)
+    depth_m, places = depth_m.ravel(), near_rows * width + near_columns
+    surface_m = depth_m.take(places)
     with np.errstate(invalid="ignore"):
+        across, down = (abs(depth_m.take(places + n) - depth_m.take(places - n)) for n in (1, width))
         is_flat = (across < _STEEP_M) & (down < _STEEP_M)
     return np.where(is_inside & has_depth(surface_m), surface_m, np.nan), ~is_flat

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 
@@ -91,9 +92,9 @@ def with_hand_shapes(
     """
     costs = costs.copy()
     for hand, is_right in ((LEFT_HAND, False), (RIGHT_HAND, True)):
-        rows = np.flatnonzero(np.isin(found, hand))
+        rows = np.flatnonzero((found >= hand[0]) & (found <= hand[-1]))
         which = found[rows] - hand[0]
-        if np.isin(PALM, which).sum() >= _LEAST_OF_PALM:
+        if np.count_nonzero(_FINGER_OF[which] < 0) >= _LEAST_OF_PALM:
             mean_m, spread_m = fit_hand(costs[rows], grid_m, rays[rows], which, is_right)
             apart = (grid_m - mean_m[:, None]) / np.hypot(_DEPTH_SIGMA_M, spread_m)[:, None]
             is_hidden = hidden_by_limbs(rays[rows, :2], mean_m, which)
@@ -123,10 +124,10 @@ def fit_hand(
         Mean of the good fits, and standard deviation among them.
     """
     is_palm = _FINGER_OF[which] < 0
-    middle_m = np.median(grid_m[costs[is_palm].argmin(axis=1)])
+    middle_m = median(grid_m[costs[is_palm].argmin(axis=1)].tolist())
     places_m, costs = rays[:, :2].T * middle_m, np.minimum(costs, _MOST)
-    known = middle_m, places_m, grid_m - middle_m, costs
-    seen = _SeenHand(which, *(array.astype(np.float32) for array in known))
+    known = (array.astype(np.float32) for array in (places_m, grid_m - middle_m, costs))
+    seen = _SeenHand(which, middle_m, *known)
     total, palms_m, *palms = _place_palm(seen.take(is_palm), is_right)
     mean_m, square_m2 = np.empty((2, len(which), len(total)))
     mean_m[is_palm], square_m2[is_palm] = palms_m, palms_m**2
@@ -158,7 +159,7 @@ def hidden_by_limbs(slopes: np.ndarray, depth_m: np.ndarray, which: np.ndarray) 
     row[which] = np.arange(len(which))
     limbs = row[np.array(HAND_LIMBS)]
     begin, end = limbs[(limbs >= 0).all(axis=1)].T
-    places_m = slopes * np.median(depth_m)
+    places_m = slopes * median(depth_m.tolist())
     along_m = places_m[end] - places_m[begin]
     from_begin_m = places_m[:, None] - places_m[begin]
     share = np.clip((from_begin_m * along_m).sum(axis=2) / np.maximum((along_m**2).sum(axis=1), 1e-12), 0, 1)
@@ -176,7 +177,7 @@ class _SeenHand:
     ----------
     which : array of int, shape (k,)
         Their numbers in the hand.
-    middle_m : array, shape ()
+    middle_m : float
         Apparent distance of the palm's centre.
     places_m : array, shape (2, k)
         Their positions across the line of sight, at that depth.
@@ -187,7 +188,7 @@ class _SeenHand:
     """
 
     which: np.ndarray
-    middle_m: np.ndarray
+    middle_m: float
     places_m: np.ndarray
     grid_m: np.ndarray
     costs: np.ndarray
@@ -195,18 +196,18 @@ class _SeenHand:
     def take(self, some: np.ndarray) -> _SeenHand:
         return replace(self, which=self.which[some], places_m=self.places_m[:, some], costs=self.costs[some])
 
-    def apart_m(self, points_m: np.ndarray) -> np.ndarray:
-        """Offsets (2, k, ...) of projected points (3, k, ...) from the observed positions."""
-        scale = 1 / (1 + points_m[2] / self.middle_m)
-        return _beside(self.places_m, points_m) - points_m[:2] * scale
+    def apart_m(self, points_m: np.ndarray, targets_m: np.ndarray) -> np.ndarray:
+        """Offsets (2, ...) of projected points (3, ...) from their targets (2, ...)."""
+        apart_m = points_m[:2] * (self.middle_m / (points_m[2] + self.middle_m))
+        return np.subtract(targets_m, apart_m, out=apart_m)
 
     def look_up(self, behind_m: np.ndarray) -> np.ndarray:
-        """Costs of depths (k, ...) behind the centre."""
+        """Costs of depths (k, ..., ...) behind the centre."""
         per_m, last = 1 / (self.grid_m[1] - self.grid_m[0]), len(self.grid_m) - 1
         place = behind_m - self.grid_m[0]  # in place from here on, as memory access dominates the time
         place *= per_m
         np.clip(np.rint(place, out=place), 0, last, out=place)
-        place += _beside(np.arange(len(self.costs), dtype=np.float32) * (last + 1), behind_m)
+        place += np.arange(len(self.costs), dtype=np.float32)[:, None, None] * (last + 1)
         return self.costs.take(place.astype(np.intp))
 
 
@@ -232,51 +233,65 @@ def _turns(is_right: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _place_palm(seen: _SeenHand, is_right: bool) -> tuple[np.ndarray, ...]:
     """The palms that fit: their costs, (p,), and the depths of their keypoints (as in `_bend`), (k, p).
 
-    Then their rotations times the size, (p, 3, 3), and the offsets of their centres from the apparent centre,
-    in depth, (p,), and across the line of sight, (2, p).
+    Then what `_bend` takes: of the q different ones their rotations times the size, (q, 3, 3), and the
+    offsets of their centres from the apparent centre across the line of sight, (2, q); and of all palms which
+    of these each is, (p,), and its centre's offset in depth, (p,).
     """
     turns, total, points_m = _turns(is_right)
-    points_m = points_m[:, np.searchsorted(PALM, seen.which)]
-    apart_m = seen.apart_m(points_m)
+    points_m = points_m.take(np.searchsorted(PALM, seen.which), axis=1)
+    apart_m = seen.apart_m(points_m, seen.places_m[:, :, None])
     shift_m = apart_m.mean(axis=1)
-    misfit = ((apart_m - shift_m[:, None]) ** 2).sum(axis=0) / _PALM_SIGMA_M**2
-    total = total + np.minimum(misfit, _MOST).sum(axis=0)
+    apart_m -= shift_m[:, None]
+    total = total + _misfits(apart_m, _PALM_SIGMA_M).sum(axis=0)
     fitting = np.argpartition(total, _N_FITTING)[:_N_FITTING]
     z_m = np.arange(-_REACH_M, _REACH_M + _STEP_M / 2, _STEP_M, dtype=np.float32)
-    total = total[fitting] + seen.look_up(points_m[2][:, None, fitting] + z_m[:, None]).sum(axis=0)
+    behind_m = points_m[2].take(fitting, axis=1)[:, None] + z_m[:, None]
+    total = total[fitting] + seen.look_up(behind_m).sum(axis=0)
     best = np.argpartition(total, _N_PLACES, axis=None)[:_N_PLACES]
     place, palm = np.unravel_index(best, total.shape)
-    palm, z_m = fitting[palm], z_m[place]
-    return total.ravel()[best], points_m[2][:, palm] + z_m, turns[palm], z_m, shift_m[:, palm]
+    z_m, palm = z_m[place], fitting[palm]
+    some = np.flatnonzero(np.bincount(palm))
+    behind_m = points_m[2][:, palm] + z_m
+    return total.ravel()[best], behind_m, turns[some], shift_m[:, some], np.searchsorted(some, palm), z_m
 
 
 def _bend(
-    seen: _SeenHand, turns: np.ndarray, z_m: np.ndarray, shift_m: np.ndarray
+    seen: _SeenHand, turns: np.ndarray, shift_m: np.ndarray, places: np.ndarray, z_m: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fingers on each palm: their costs in the best shapes, (p,), and their depths, (k, p).
+    """Fingers on each palm, as of `_place_palm`: their costs in the best shapes, (p,), and depths, (k, p).
 
     Depths are relative to the apparent centre: the weighted mean over shapes, and the mean of the square.
     """
-    shapes_m = load_hand_shapes()[:, seen.which].swapaxes(0, 1)
-    points_m = _turned(shapes_m.reshape(-1, 3), turns).reshape(3, *shapes_m.shape[:2], -1)
-    misfit = ((seen.apart_m(points_m) - shift_m[:, None, None]) ** 2).sum(axis=0) / _FINGER_SIGMA_M**2
-    behind_m = points_m[2] + z_m
-    of = _FINGER_OF[seen.which]
-    first = np.flatnonzero(np.diff(of, prepend=-1))
-    cost = np.minimum(misfit, _MOST) + seen.look_up(behind_m)
-    cost = np.stack([finger[0] + finger[1:].sum(axis=0) for finger in np.split(cost, first[1:])])
-    least = cost.min(axis=1, keepdims=True)
-    weights = np.exp((least - cost) / _LIKELY)
-    weights /= weights.sum(axis=1, keepdims=True)
-    weighted_m = weights.repeat(np.diff(first, append=len(of)), axis=0) * behind_m
-    return least.sum(axis=(0, 1)), weighted_m.sum(axis=1), (weighted_m * behind_m).sum(axis=1)
+    shapes_m = load_hand_shapes()[:, seen.which].T
+    turned_m = turns.swapaxes(0, 1).reshape(-1, 3) @ shapes_m.reshape(3, -1)
+    turned_m = turned_m.reshape(3, -1, *shapes_m.shape[1:]).swapaxes(1, 2)  # (3, k, q, shapes)
+    targets_m = seen.places_m[..., None] - shift_m[:, None]
+    misfits = _misfits(seen.apart_m(turned_m, targets_m[..., None]), _FINGER_SIGMA_M)
+    behind_m = turned_m[2].take(places, axis=1) + z_m[:, None]
+    finger = _FINGER_OF[seen.which]
+    belongs = (finger == np.arange(len(FINGERS))[:, None]).astype(np.float32)
+    of_palms, of_depths = (
+        (belongs @ costs.reshape(len(finger), -1)).reshape(len(FINGERS), -1, costs.shape[2])
+        for costs in (misfits, seen.look_up(behind_m))
+    )
+    costs = of_palms.take(places, axis=1) + of_depths
+    least = costs.min(axis=2, keepdims=True)
+    weights = np.exp((least - costs) / _LIKELY)
+    weights /= weights.sum(axis=2, keepdims=True)
+    weights = weights[finger]
+    mean_m, square_m2 = (np.einsum("kps,kps->kp", weights, values) for values in (behind_m, behind_m**2))
+    return least.sum(axis=(0, 2)), mean_m, square_m2
+
+
+def _misfits(apart_m: np.ndarray, sigma_m: float) -> np.ndarray:
+    """The costs of offsets (2, ...), which are overwritten."""
+    apart_m *= apart_m
+    misfit = apart_m[0]
+    misfit += apart_m[1]
+    misfit *= 1 / sigma_m**2
+    return np.minimum(misfit, _MOST, out=misfit)
 
 
 def _turned(points_m: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Points (k, 3) under every rotation (p, 3, 3), shape (3, k, p)."""
     return points_m @ turns.transpose(1, 2, 0)
-
-
-def _beside(values: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Values of keypoints with axes appended, to broadcast with arrays of points."""
-    return values[(..., *[None] * (points.ndim - values.ndim))]

@@ -39,6 +39,7 @@ wide there in the median, of which 1.3 cm are already in the image, so no cost o
 
 from collections.abc import Sequence
 from dataclasses import replace
+from statistics import median
 
 import numpy as np
 
@@ -115,7 +116,7 @@ def lift_robust(
     points_m, sigma_m = (np.full(array.shape, np.nan) for array in (paper.points_m, paper.sigma_m))
     reason = np.where(paper.reason == LIFTED, NO_DEPTH, paper.reason)
     for person, pixels_px in enumerate(np.asarray(keypoints_px, float)):
-        found = np.flatnonzero(np.isin(paper.reason[person], (LIFTED, NO_DEPTH)))
+        found = np.flatnonzero((paper.reason[person] == LIFTED) | (paper.reason[person] == NO_DEPTH))
         first_m = paper.points_m[person, found, 2]
         if np.isfinite(first_m).any():
             grid_m, candidates = _depths(found, first_m, pixels_px[found], depth_m, intrinsics)
@@ -157,7 +158,7 @@ def _choose(
     depth_m, is_seen = refine_depths(candidates, grid_m[chosen], _GRID_M)
     points_m = candidates.rays * depth_m[:, None]
     if "limb_lengths" in steps:
-        is_seen[on] &= ~out_of_reach(chosen[on], limbs)
+        is_seen[on] &= ~out_of_reach(candidates.rays[on] * grid_m[chosen[on], None], limbs)
         points_m *= 1 + _deeper_end_on(points_m, found)[:, None]
     unlikely = np.where(is_seen, _COST_SEEN, _COST_GUESSED[found])
     return points_m, is_seen, _sigmas_m(costs, grid_m, depth_m, unlikely)
@@ -165,7 +166,9 @@ def _choose(
 
 def _deeper_end_on(points_m: np.ndarray, found: np.ndarray) -> np.ndarray:
     """The fraction by which joints (m,) are farther away when their limb points at the camera."""
-    rows, ahead = np.searchsorted(found, _AHEAD[:, np.isin(_AHEAD, found).all(axis=0)])
+    is_found = np.zeros(N_KEYPOINTS, bool)
+    is_found[found] = True
+    rows, ahead = np.searchsorted(found, _AHEAD[:, is_found[_AHEAD].all(axis=0)])
     joints_m, limbs_m = points_m[rows], points_m[rows] - points_m[ahead]
     away_m, length_m = (np.linalg.norm(vectors, axis=1) for vectors in (joints_m, limbs_m))
     cosine = np.maximum((limbs_m * joints_m).sum(axis=1) / (length_m * away_m), 0)
@@ -183,5 +186,6 @@ def _sigmas_m(costs: np.ndarray, grid_m: np.ndarray, depth_m: np.ndarray, unlike
 
 def _middle_m(found: np.ndarray, first_m: np.ndarray) -> float:
     """Approximate distance of the person: the median depth of the body, or of all keypoints without one."""
-    body_m = first_m[_IN_BODY[found]]
-    return float(np.nanmedian(body_m if np.isfinite(body_m).any() else first_m))
+    known = np.isfinite(first_m)
+    of_body = known & _IN_BODY[found]
+    return median(first_m[of_body if of_body.any() else known].tolist())

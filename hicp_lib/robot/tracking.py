@@ -3,6 +3,12 @@
 Detectors hallucinate people for one frame, lose real ones for a few, and single keypoints jump. So a keypoint
 is trusted from its second detection near the first one, keeps its last trusted position while newer
 detections contradict it, and decays when it is no longer detected.
+
+How uncertain a keypoint's depth is (`sigma_m` of robust lifting) does not count, as it was no help: with
+weights divided by 1 + (sigma / s)^2, the least distance in the first reach changed by -0.4 mm for s = 20 cm
+(-1.3 to 0.4 mm) and for 8 cm (-1.8 to 0.8 mm; development subjects 0 to 3 of seed 0 in the three scripts,
+MediaPipe, intervals over the twelve runs). A large sigma does mean a wrong depth, 7 in 10 of those above 5 cm
+are off by more than 15 cm, but these are 3 % of the keypoints.
 """
 
 from collections import deque

@@ -143,7 +143,8 @@ def misfits_m2(places_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
 
 def test_palms_cost_their_size_and_their_misfit():
     seen = seen_hand(PALM)
-    cost, behind_m, turns, z_m, _ = _place_palm(seen, True)
+    cost, behind_m, turns, _, places, z_m = _place_palm(seen, True)
+    turns = turns[places]
     assert len(cost) == 40
     assert np.unique(z_m.round(4)) == pytest.approx(np.arange(-15, 16) / 100)  # all as good
     points_m = np.einsum("kj,pij->pki", load_hand_shapes()[0, PALM], turns)
@@ -155,7 +156,8 @@ def test_palms_cost_their_size_and_their_misfit():
 
 def test_fingers_cost_their_best_shapes_and_lie_in_the_mean_of_the_likely_ones():
     _, _, *palms = _place_palm(seen_hand(PALM), True)
-    turns, z_m, shift_m = palms
+    turns, shift_m, places, z_m = palms
+    turns, shift_m = turns[places], shift_m[:, places]
     index_finger, seen = FINGERS[1], seen_hand(FINGERS[1])
     cost, mean_m, square_m2 = _bend(seen, *palms)
     shapes_m = np.einsum("skj,ij->ski", load_hand_shapes()[:, index_finger], turns[0])

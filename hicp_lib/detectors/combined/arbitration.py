@@ -111,6 +111,8 @@ def merge_duplicates(hands: Hands, rule: ArbitrationRule) -> Hands:
 
 
 def _median(same: Hands, rule: ArbitrationRule) -> Hands:
+    if len(same) == 1:  # always, if the image is looked at once: on a robot, in time
+        return Hands(same.keypoints_px, same.scores * (1 - rule.alone), same.sides)
     given = np.isfinite(same.keypoints_px).all(axis=(0, 2))  # points that all sightings give
     points = np.where(given[:, None], np.median(same.keypoints_px, axis=0), same.keypoints_px[0])
     scores = np.where(given, np.median(same.scores, axis=0), same.scores[0])

@@ -82,7 +82,7 @@ class HeadCamera:
     observations: list[Observation] = field(default_factory=list)
 
     def perceive(self, moment: Moment, posture: Posture, read: Posture) -> Perception:
-        """Render the view, detect people and lift them; store the observation.
+        """Render the view, detect people and lift them, without what is on the robot; store the observation.
 
         Outside `LOOKED_AT_S` nothing is rendered or detected.
 
@@ -102,8 +102,11 @@ class HeadCamera:
             return Perception(moment.time_s, np.zeros((0, N_KEYPOINTS, 3)), np.zeros((0, N_KEYPOINTS)))
         rgb, depth_m = self._image(moment, posture)
         start_s = time.perf_counter()
-        found = self.detector.detect(rgb)
-        perception = lifted(found, depth_m, moment.time_s, read, self.lifting)
+        found, icub = self.detector.detect(rgb), load_icub()
+        points_cam_m = lift_robust(found.keypoints_px, depth_m, COLOUR, METHODS[self.lifting]).points_m
+        T_root_camera = icub.T_root_camera(read.angles("head"), MOUNT)
+        points_m = filter_self(icub, read, transform(T_root_camera, points_cam_m))
+        perception = Perception(moment.time_s, points_m, found.scores)
         elapsed_ms = 1e3 * (time.perf_counter() - start_s)
         self.observations.append(Observation(moment, posture, rgb, found, perception, elapsed_ms))
         return perception
@@ -137,33 +140,6 @@ def photograph(moment: Moment, posture: Posture) -> RgbdImage:
     camera = robot_camera(icub.T_root_camera(posture.angles("head"), MOUNT))
     world = moment.world(robot_surfaces(icub, posture))
     return colour_and_depth(render(world, camera), camera, rng)
-
-
-def lifted(
-    found: Detections, depth_m: np.ndarray, time_s: float, posture: Posture, method: str = "robust"
-) -> Perception:
-    """Keypoints in the root frame, without those on the robot's own body.
-
-    Parameters
-    ----------
-    found : Detections
-    depth_m : array, shape (480, 640)
-    time_s : float
-        When the image was taken.
-    posture : Posture
-        The robot's, then.
-    method : str, optional
-        One of `hicp_lib.lifting.robust.METHODS`.
-
-    Returns
-    -------
-    Perception
-    """
-    icub = load_icub()
-    in_camera = lift_robust(found.keypoints_px, depth_m, COLOUR, METHODS[method])
-    T_root_camera = icub.T_root_camera(posture.angles("head"), MOUNT)
-    points_m = filter_self(icub, posture, transform(T_root_camera, in_camera.points_m))
-    return Perception(time_s, points_m, found.scores)
 
 
 _GLOSS, _ROUGHNESS = 0.04, 0.35  # of painted covers
