@@ -15,6 +15,7 @@ import warnings
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import asdict
 from functools import partial
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -288,22 +289,25 @@ def evaluate(
     """
     from hicp_lib.core.keypoints import GROUPS
     from hicp_lib.evaluation.ap import judgement
-    from hicp_lib.formats.annotations import read_annotations, read_detections
+    from hicp_lib.formats.annotations import detections_in_parts, read_annotations
     from hicp_lib.formats.detection_files import refuse_other_suffix
 
     if out is not None:
         refuse_other_suffix(out)
     people = read_annotations(annotations, keypoint_map)
-    found = read_detections(detections, people)
+    parts = detections_in_parts(detections, people)
+    found = list(islice(parts, 1))
     _tell_notes(annotations, people.notes, area)
     options = {"area": area} | ({"sigmas": sigmas} if sigmas else {})
-    judged = judgement.judge(people, found, [group] if group else GROUPS, by_image, seed, **options)
+    judged = judgement.judge(
+        people, chain(found, parts), [group] if group else GROUPS, by_image, seed, **options
+    )
     if out is not None:
         judgement.write_judgement(out, judged)
     if as_json:
         click.echo(json.dumps(judged, indent=2))
         return
-    if not any(map(len, found.values())):
+    if not found:
         click.echo(f"{detections}: an empty list: nobody was found in any image")
     rows = (judged, *judged["other_definitions"])
     for row in rows:

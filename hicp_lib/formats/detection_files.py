@@ -26,7 +26,7 @@ from hicp_lib.core.files import atomic_path, remove_left
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
 from hicp_lib.core.tables import read_table
 from hicp_lib.formats.layouts import PERSON_CATEGORY
-from hicp_lib.formats.number_lists import read_people
+from hicp_lib.formats.number_lists import read_people, read_people_in_parts
 
 SUFFIXES = (".json", ".csv", ".parquet")
 _BUFFER_BYTES = 2**20
@@ -215,8 +215,18 @@ def read_rows(path: Path) -> Any:
     InputError
         If it cannot be read, or is a table without the columns that `open_detections` writes.
     """
-    if path.suffix not in (".csv", ".parquet"):
-        return read_people(path)
+    return read_people(path) if path.suffix not in (".csv", ".parquet") else _rows_of_table(path)
+
+
+def rows_in_parts(path: Path) -> Iterator[Any]:
+    """As `read_rows`, but a list comes as several shorter ones, so that memory need not hold all of it."""
+    if path.suffix in (".csv", ".parquet"):
+        yield _rows_of_table(path)
+    else:
+        yield from read_people_in_parts(path)
+
+
+def _rows_of_table(path: Path) -> list[dict]:
     refuse_other_suffix(path)
     columns = ("image_id", "person", "person_score", "keypoint", "u_px", "v_px", "score")
     table = read_table(path, columns, dtype={"file_name": str})

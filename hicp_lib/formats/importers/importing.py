@@ -17,13 +17,13 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.images import inside
 from hicp_lib.formats.annotations import Annotations
-from hicp_lib.formats.importers.matching import match_images
+from hicp_lib.formats.importers.matching import ImageMatcher
 from hicp_lib.formats.importers.mmpose import read_mmpose
 from hicp_lib.formats.importers.openpose import read_openpose, refuse_other_size
 from hicp_lib.formats.importers.people import People
 from hicp_lib.formats.importers.results import ALPHAPOSE, COCO, DETECTRON2, read_results
 from hicp_lib.formats.importers.scores import score_scale
-from hicp_lib.formats.units import refuse_fractions
+from hicp_lib.formats.units import count_fractions, refuse_fractions
 
 _LEAST_IMAGES = 5  # needed to decide whether coordinates are of another size
 _OFF, _ALIKE = np.log(1.25), 0.1  # logarithms of ratios: another size, and equal in both directions
@@ -147,8 +147,8 @@ def import_predictions(
     if scale is not None and not 0 < scale < np.inf:
         raise InputError(f"--score-scale is {scale:g}; expected a positive number")
     people = READERS[format](Path(path))
-    refuse_fractions(people.path, people.keypoints_px)
-    matched = match_images(people.path, people.sources, people.named_by, annotations.images)
+    refuse_fractions(people.path, [count_fractions(people.keypoints_px)])
+    matched = ImageMatcher(people.path, people.named_by, annotations.images).match(people.sources)
     scale = score_scale(format, people) if scale is None else scale
     rows = np.flatnonzero([matched[s] is not None for s in people.source_of])
     shown = [annotations.images[i] for s in people.source_of if (i := matched[s]) is not None]
