@@ -13,7 +13,6 @@ import signal
 import sys
 import warnings
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import asdict
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
@@ -243,12 +242,12 @@ def import_(
 ) -> None:
     """Read the predictions another tool wrote."""
     from hicp_lib.formats.annotations import read_annotations, write_detections
-    from hicp_lib.formats.importers.importing import import_predictions
+    from hicp_lib.formats.importers.importing import import_predictions, summary_lines
 
     imported = import_predictions(kind, predictions, read_annotations(annotations, keypoint_map), score_scale)
     write_detections(out, imported.detections, imported.extras)
     summary = imported.summary
-    click.echo(json.dumps(asdict(summary), indent=2) if as_json else "\n".join(summary.lines()))
+    click.echo(json.dumps(summary, indent=2) if as_json else "\n".join(summary_lines(summary)))
 
 
 @hicp.command("export")

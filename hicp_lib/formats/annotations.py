@@ -291,17 +291,14 @@ def write_annotations(path: str | Path, annotations: Annotations) -> None:
     flags = np.where(a.visibility < 0, FLAG_OUTSIDE, a.visibility)[..., None]
     given = np.isfinite(a.keypoints_px).all(axis=-1, keepdims=True) | (flags == FLAG_OUTSIDE)
     triples = np.where(given, np.concatenate([np.nan_to_num(a.keypoints_px), flags], axis=-1), 0.0)
-    people = [
-        {
-            **extra, "id": i, "image_id": image, "category_id": PERSON_CATEGORY, "bbox": box, "area": area,
-            "iscrowd": crowd, "num_keypoints": count, "keypoints": flat,
-        }
-        for extra, i, image, box, area, crowd, count, flat in zip(
-            a.extras, a.ids.tolist(), a.image_ids.tolist(), a.boxes_px.tolist(), a.areas_px2.tolist(),
-            a.is_crowd.astype(int).tolist(), (a.visibility[:, COCO_17] > 0).sum(axis=1).tolist(),
-            triples.reshape(len(a), 3 * N_KEYPOINTS).tolist(), strict=True,
-        )
-    ]  # fmt: skip
+    columns = {
+        "id": a.ids, "image_id": a.image_ids, "category_id": np.full(len(a), PERSON_CATEGORY),
+        "bbox": a.boxes_px, "area": a.areas_px2, "iscrowd": a.is_crowd.astype(int),
+        "num_keypoints": (a.visibility[:, COCO_17] > 0).sum(axis=1),
+        "keypoints": triples.reshape(len(a), 3 * N_KEYPOINTS),
+    }  # fmt: skip
+    values = zip(*(of.tolist() for of in columns.values()), strict=True)
+    people = [e | dict(zip(columns, of, strict=True)) for e, of in zip(a.extras, values, strict=True)]
     category = {**PERSON, "keypoints": list(NAMES)}
     write_json(path, {"images": image_rows(a), "annotations": people, "categories": [category]})
 

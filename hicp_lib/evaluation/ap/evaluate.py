@@ -39,10 +39,6 @@ class Evaluation:
         Crowds, other people, people without a labelled keypoint of the group.
     n_images, n_detections : int
         Number of images, and of evaluated detections.
-    precision : array, shape (10, 101)
-        Per OKS threshold .5:.05:.95 at recall 0:.01:1.
-    recall : array, shape (10,)
-        Per OKS threshold.
     matches : cocoeval.Matches
         Used by the bootstrap.
     """
@@ -59,8 +55,6 @@ class Evaluation:
     n_ignored: int
     n_images: int
     n_detections: int
-    precision: np.ndarray
-    recall: np.ndarray
     matches: cocoeval.Matches
 
     def metrics(self) -> dict[str, float]:
@@ -191,18 +185,16 @@ class Evaluator:
             self._images, self._people, cocoeval.Found(slots, scores),
             lambda who, rows: fits[first[rows, None] + np.arange(who.shape[1])], len(self._objects),
         )  # fmt: skip
-        precision, recall = cocoeval.precision_recall(matches)
+        figures = cocoeval.metrics(*cocoeval.precision_recall(matches))
         n_people = int(matches.n_people.sum())
         return Evaluation(
             group=self._group,
             options=self._options,
-            **{name: float(value) for name, value in cocoeval.metrics(precision, recall).items()},
+            **{name: float(value) for name, value in figures.items()},
             n_people=n_people,
             n_ignored=len(self._flags) - n_people,
             n_images=len(self._images),
             n_detections=len(scores),
-            precision=precision,
-            recall=recall,
             matches=matches,
         )
 
@@ -289,13 +281,9 @@ def people_seen(
         The s² of OKS.
     """
     counts_outside = options.outside == "count"
-    flags = known_flags(annotations) if counts_outside else annotations.visibility
-    flags = flags[:, objects]
-    signs = (flags > 0).astype(np.int8)
-    if options.labelled == "visible":
-        signs = (flags >= VISIBLE).astype(np.int8)
-    if counts_outside:
-        signs -= flags < 0
+    flags = (known_flags(annotations) if counts_outside else annotations.visibility)[:, objects]
+    is_inside = flags >= VISIBLE if options.labelled == "visible" else flags > 0
+    signs = is_inside.astype(np.int8) - (counts_outside & (flags < 0))
     seen = signs.any(axis=(1, 2)) | annotations.is_crowd | (options.unlabelled == "ignore")
     if options.others == "count":
         seen &= ~annotations.is_other
@@ -304,18 +292,13 @@ def people_seen(
 
 
 def _areas(people: Annotations, rows: np.ndarray, area: str) -> np.ndarray:
-    if area == "source":
-        return np.array([_source_area(people, i) for i in rows], dtype=float)
-    of_box = people.boxes_px[rows, 2] * people.boxes_px[rows, 3]
-    return {"segment": people.areas_px2[rows], "box": of_box, "box53": SEGMENT_OF_BOX * of_box}[area]
-
-
-def _source_area(people: Annotations, i: int) -> float:
-    if people.is_crowd[i]:
-        return float(people.areas_px2[i])
-    value: Any = people.extras[i].get("source_area")
-    if type(value) not in (int, float):
-        raise InputError(
-            f"annotation {people.ids[i]}: has no 'source_area'; area 'source' is for HiCP folders"
-        )
-    return float(value)
+    segment, of_box = people.areas_px2[rows], people.boxes_px[rows, 2:].prod(axis=1)
+    if area != "source":
+        return {"segment": segment, "box": of_box, "box53": SEGMENT_OF_BOX * of_box}[area]
+    for k in np.flatnonzero(~people.is_crowd[rows]):
+        value: Any = people.extras[rows[k]].get("source_area")
+        if type(value) not in (int, float):
+            problem = "has no 'source_area'; area 'source' is for HiCP folders"
+            raise InputError(f"annotation {people.ids[rows[k]]}: {problem}")
+        segment[k] = value
+    return segment
