@@ -17,7 +17,7 @@ from hicp_lib.datasets.crops import image_sizes, with_outside
 from hicp_lib.evaluation.calibration.keypoint_hits import HIT_TERM
 from hicp_lib.evaluation.cases import Found, Truth
 from hicp_lib.evaluation.matching import matched_people
-from hicp_lib.formats.annotations import Annotations, source_images
+from hicp_lib.formats.annotations import Annotations, rows_by_image, source_images
 
 # True state of a keypoint: visible in the picture, occluded in the picture, outside the picture, or unknown
 # (not labelled in the source image).
@@ -56,7 +56,7 @@ def placed_keypoints(truth: Truth, found: Found, source: Annotations) -> pd.Data
 
 def _of_case(people: Annotations, run: Mapping[int, Detections], subset: str, detector: str) -> pd.DataFrame:
     """The rows of one detector on one subset."""
-    rows_of = pd.Series(range(len(people))).groupby(people.image_ids).indices
+    rows_of = rows_by_image(people.image_ids)
     pairs = [
         (rows_of[image_id][person], detections, row)
         for image_id, detections in run.items()
