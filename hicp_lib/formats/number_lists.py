@@ -6,7 +6,7 @@ A number takes 8 bytes in an array, but 32 as a Python object, plus 5 to 20 for 
 import re
 from collections.abc import Iterator
 from contextlib import suppress
-from itertools import accumulate, chain
+from itertools import accumulate, chain, islice
 from mmap import mmap
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from hicp_lib.core.limited import raised
 _START_OF_LIST = re.compile(rb'\A\s*(?=\[)|"annotations"\s*:\s*(?=\[)')
 _BLOCK_BYTES = 2**22
 _MAX_BYTES = 4 * MAX_BYTES  # of a file; arrays of its numbers need less than half
+_MOST_STARTS = 8  # that are tried: a file may have many inner lists of that name
 _EXPECTED = "give the path of a JSON file"
 
 
@@ -97,7 +98,7 @@ def _parts(path: str | Path) -> Iterator[Any]:
 
 def _before_list(text: bytes) -> bytes | None:
     """The text before a file's list of people, if that has begun."""
-    for found in _START_OF_LIST.finditer(text):
+    for found in islice(_START_OF_LIST.finditer(text), _MOST_STARTS):
         with suppress(orjson.JSONDecodeError):  # of an inner object
             before = text[: found.end()]
             orjson.loads(before + b"0}" if before.strip() else b"0")

@@ -1,6 +1,7 @@
 """Lists of keypoints that become arrays while a file is read: the same content, whatever the blocks cut."""
 
 import json
+import time
 
 import numpy as np
 import pytest
@@ -61,6 +62,20 @@ def test_a_long_list_is_never_held_as_a_whole(tmp_path, monkeypatch):
     (tmp_path / "a.json").write_text(json.dumps(ROWS * 200))
     parts = list(read_people_in_parts(tmp_path / "a.json"))
     assert sum(map(len, parts)) == 4 * 200 and max(map(len, parts)) < 40
+
+
+def test_inner_lists_of_that_name_are_not_the_people(tmp_path, blocks):
+    inner = {"info": [{"annotations": [{"keypoints": [1]}]}] * 3, "annotations": ROWS}
+    (tmp_path / "a.json").write_text(json.dumps(inner))
+    assert plain(read_people(tmp_path / "a.json")) == plain(inner)
+
+
+def test_very_many_inner_lists_take_no_time(tmp_path):
+    inner = {"info": [{"annotations": []}] * 200_000}
+    (tmp_path / "a.json").write_text(json.dumps(inner))
+    start_s = time.process_time()
+    assert read_people(tmp_path / "a.json") == inner
+    assert time.process_time() - start_s < 5
 
 
 @pytest.mark.parametrize("end", ["", "]]", "] 3", ", ]", " {}]", ', {"a": NaN}]', ", 1e]"])
