@@ -314,7 +314,8 @@ def image_rows(annotations: Annotations) -> list[dict]:
 def read_detections(path: str | Path, annotations: Annotations | None = None) -> dict[int, Detections]:
     """Read COCO keypoint results (a list of `image_id, category_id, keypoints, score`).
 
-    An empty list is valid: nobody was found. If every result has a `file_name`, it identifies the image.
+    An empty list is valid: nobody was found. If the first result has a `file_name`, all need one, and it
+    identifies the image.
 
     Parameters
     ----------
@@ -336,8 +337,7 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     found = {} if annotations is None else dict.fromkeys(annotations.images, Detections.none())
     for image_ids, people in detections_in_parts(path, annotations):
         for image_id, chosen in rows_by_image(image_ids).items():
-            together = chosen[-1] - chosen[0] == len(chosen) - 1
-            more = people.take(slice(chosen[0], chosen[-1] + 1) if together else chosen)
+            more = people.take(chosen)
             found[image_id] = found[image_id].concatenate(more) if len(found.get(image_id, ())) else more
     return dict(sorted(found.items())) if annotations is None else found
 
@@ -393,9 +393,7 @@ def _whole_images(parts: Iterable[Any]) -> Iterator[Any]:
             yield part
             continue
         waiting += part
-        images = [
-            row.get("file_name", row.get("image_id")) if isinstance(row, dict) else 0 for row in waiting
-        ]
+        images = [row.get("file_name", row.get("image_id")) for row in waiting if isinstance(row, dict)]
         end = next((i for i in range(len(images) - 1, 0, -1) if images[i] != images[i - 1]), 0)
         if end:
             yield waiting[:end]
