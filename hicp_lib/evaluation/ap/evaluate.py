@@ -131,6 +131,7 @@ class Evaluator:
         is_crowd = np.repeat(annotations.is_crowd[self._rows], len(objects))
         self._people = cocoeval.People(slots, (self._flags != 0).any(axis=1) & ~is_crowd, is_crowd)
         self._by_slot = np.argsort(slots, kind="stable")
+        self._sorted_slots = slots[self._by_slot]
         self._found = [(np.zeros(0, int), np.zeros(0), np.zeros(0, int), np.zeros(0))]
 
     def add(self, image_ids: np.ndarray, found: Detections) -> None:
@@ -151,9 +152,8 @@ class Evaluator:
         scores = of_person if options.score == "person" else of_keypoints.mean(axis=-1)
         slots, points_px = self._slots(image_ids)[seen], points_px[seen]
         present = (given & (of_keypoints >= PRESENCE_CUT))[seen]
-        first, past = (
-            np.searchsorted(self._people.slots[self._by_slot], slots, side) for side in ("left", "right")
-        )
+        # Each detection makes a pair with each of the people in its slot, who are together in `_by_slot`.
+        first, past = (np.searchsorted(self._sorted_slots, slots, side) for side in ("left", "right"))
         n = past - first
         who = self._by_slot[np.arange(n.sum()) + np.repeat(first - np.cumsum(n) + n, n)]
         rows, fits = np.repeat(np.arange(len(n)), n), np.empty(len(who))
