@@ -110,13 +110,10 @@ def write_judgement(path: Path, judged: dict[str, Any]) -> None:
     if path.suffix == ".json":
         write_json(path, judged, indent=2)
         return
+    shared = [key for key, of in judged.items() if not isinstance(of, dict | list)]
+    shared = [key for key in shared if key not in judged["metrics"]]
     of_all = [
-        {
-            key: row[key]
-            for key in row
-            if key not in judged["metrics"] and not isinstance(row[key], dict | list)
-        }
-        | {"metric": name, **figure}
+        {key: row[key] for key in shared} | {"metric": name, **figure}
         for row in (judged, *judged["other_definitions"])
         for name, figure in row["metrics"].items()
     ]
