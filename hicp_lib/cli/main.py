@@ -13,8 +13,8 @@ import signal
 import sys
 import warnings
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import asdict
 from functools import partial
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -240,12 +240,12 @@ def import_(
 ) -> None:
     """Read the predictions another tool wrote."""
     from hicp_lib.formats.annotations import read_annotations, write_detections
-    from hicp_lib.formats.importers.importing import import_predictions
+    from hicp_lib.formats.importers.importing import import_predictions, summary_lines
 
     imported = import_predictions(kind, predictions, read_annotations(annotations, keypoint_map), score_scale)
     write_detections(out, imported.detections, imported.extras)
     summary = imported.summary
-    click.echo(json.dumps(asdict(summary), indent=2) if as_json else "\n".join(summary.lines()))
+    click.echo(json.dumps(summary, indent=2) if as_json else "\n".join(summary_lines(summary)))
 
 
 @hicp.command("export")
@@ -286,23 +286,24 @@ def evaluate(
     """
     from hicp_lib.core.keypoints import GROUPS
     from hicp_lib.evaluation.ap import judgement
-    from hicp_lib.formats.annotations import read_annotations, read_detections
+    from hicp_lib.formats.annotations import detections_in_parts, read_annotations
     from hicp_lib.formats.detection_files import refuse_other_suffix
 
     if out is not None:
         refuse_other_suffix(out)
     people = read_annotations(annotations, keypoint_map)
-    found = read_detections(detections, people)
+    parts = detections_in_parts(detections, people)
+    found = list(islice(parts, 1))
     _tell_notes(annotations, people.notes, area)
     options = {"area": area} | ({} if sigmas is None else {"sigmas": sigmas})
     groups = GROUPS if group is None else [group]
-    judged = judgement.judge(people, found, groups, by_image, seed, **options)
+    judged = judgement.judge(people, chain(found, parts), groups, by_image, seed, **options)
     if out is not None:
         judgement.write_judgement(out, judged)
     if as_json:
         click.echo(json.dumps(judged, indent=2))
         return
-    if not any(map(len, found.values())):
+    if not found:
         click.echo(f"{detections}: an empty list: nobody was found in any image")
     rows = (judged, *judged["other_definitions"])
     for row in rows:

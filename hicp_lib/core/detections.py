@@ -75,6 +75,10 @@ class Detections:
         pairs = zip(vars(self).values(), vars(more).values(), strict=True)
         return Detections(*map(np.concatenate, pairs))
 
+    def take(self, rows: np.ndarray | slice) -> Detections:
+        """The people of some rows."""
+        return Detections(*(of[rows] for of in vars(self).values()))
+
     def __len__(self) -> int:
         return len(self.person_scores)
 

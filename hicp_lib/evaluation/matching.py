@@ -1,7 +1,5 @@
 """Match detections to people by object keypoint similarity (OKS)."""
 
-from collections.abc import Iterator, Mapping
-
 import numpy as np
 
 from hicp_lib.core.detections import Detections
@@ -36,37 +34,6 @@ def pairwise_oks(
         people.keypoints_px[:, None, keypoints], people.visibility[:, None, keypoints] > 0,
         people.boxes_px[:, None], people.areas_px2[:, None], found.keypoints_px[None, :, keypoints], sigmas,
     )  # fmt: skip
-
-
-def best_oks(
-    people: Annotations, found: Mapping[int, Detections], keypoints: np.ndarray, sigmas: np.ndarray
-) -> Iterator[tuple[int, float]]:
-    """How well each evaluated person with a labelled keypoint of a group is found.
-
-    Parameters
-    ----------
-    people : Annotations
-        Of any images; crowds are not evaluated.
-    found : mapping of int to Detections
-        By image id.
-    keypoints : array of int, shape (k,)
-        Halpe indices of the group.
-    sigmas : array, shape (k,)
-        Their constants.
-
-    Yields
-    ------
-    row : int
-        The person's, in `people`.
-    oks : float
-        Of the best detection, 0 if there is none.
-    """
-    labelled = people.visibility[:, keypoints] > 0
-    for i in np.flatnonzero(labelled.any(axis=1) & ~people.is_crowd).tolist():
-        points = found.get(int(people.image_ids[i]), Detections.none()).keypoints_px[:, keypoints]
-        truth = people.keypoints_px[i, keypoints]
-        fits = oks(truth, labelled[i], people.boxes_px[i], people.areas_px2[i], points, sigmas)
-        yield i, float(fits.max(initial=0.0))
 
 
 def match_best_first(fit: np.ndarray, scores: np.ndarray, least: float = MATCH_OKS) -> dict[int, int]:

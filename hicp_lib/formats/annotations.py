@@ -19,7 +19,7 @@ Both are checked when they are read. Conventions of this module, where existing 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -32,12 +32,12 @@ from hicp_lib.core.files import write_json
 from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS, NAMES
 from hicp_lib.core.names import is_inside
 from hicp_lib.formats.cropcoco import FLAG_OUTSIDE, OUTSIDE, outside_from_flags
-from hicp_lib.formats.detection_files import open_detections, read_rows
-from hicp_lib.formats.importers.matching import match_images
+from hicp_lib.formats.detection_files import open_detections, rows_in_parts
+from hicp_lib.formats.importers.matching import ImageMatcher
 from hicp_lib.formats.json_validation import CONVENTIONS, PART_KEYS, Layouts, Rows
 from hicp_lib.formats.layouts import PERSON_CATEGORY, PersonCategory, layouts_of, person_category
 from hicp_lib.formats.number_lists import read_people
-from hicp_lib.formats.units import corners_note, doubts, refuse_fractions
+from hicp_lib.formats.units import corners_note, count_fractions, doubts, refuse_fractions
 
 SEGMENT_OF_BOX = 0.53  # typical ratio of the segment's area to the box's, as other tools use it
 _LEAST_AREA, _MOST_AREA = 0.01, 2.0  # plausible areas of a person, relative to the box
@@ -241,7 +241,7 @@ def _sides(rows: Rows, key: str) -> list[int]:
 
 
 def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> Annotations:
-    ids, image_ids = rows.unique_integers("id"), _images_of(rows, images)
+    ids, image_ids = rows.unique_integers("id"), ImageMatcher(rows.path, "id", images).images_of(rows)
     boxes = rows.vectors("bbox", ("x", "y", "width", "height"))
     for i in np.flatnonzero((boxes[:, 2:] < 0).any(axis=1))[:1]:
         raise rows.error(i, "bbox has a negative width or height; expected [x, y, width, height] in pixels")
@@ -254,9 +254,10 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> 
     visibility = np.where(outside, OUTSIDE, np.maximum(triples[..., 2], 0.0))
     known = (visibility > 0) | (outside & (triples[..., :2] != 0).any(axis=-1))
     keypoints = np.where(known[..., None], triples[..., :2], np.nan)
-    labelled = np.where((visibility > 0)[..., None], keypoints, np.nan)
-    refuse_fractions(rows.path, labelled)
-    refuse_fractions(rows.path, boxes.reshape(-1, 2, 2), "boxes")
+    del triples  # large data are held in memory once
+    labelled = np.where((visibility > 0)[..., None], keypoints, np.nan) if outside.any() else keypoints
+    refuse_fractions(rows.path, [count_fractions(labelled)])
+    refuse_fractions(rows.path, [count_fractions(boxes.reshape(-1, 2, 2))], "boxes")
     shown = boxes, labelled, sizes
     is_unnamed = layouts is CONVENTIONS and "coco17" in found
     notes = {"names": "17 keypoints without names are taken for COCO's" * is_unnamed, "area": area_note}
@@ -290,17 +291,14 @@ def write_annotations(path: str | Path, annotations: Annotations) -> None:
     flags = np.where(a.visibility < 0, FLAG_OUTSIDE, a.visibility)[..., None]
     given = np.isfinite(a.keypoints_px).all(axis=-1, keepdims=True) | (flags == FLAG_OUTSIDE)
     triples = np.where(given, np.concatenate([np.nan_to_num(a.keypoints_px), flags], axis=-1), 0.0)
-    people = [
-        {
-            **extra, "id": i, "image_id": image, "category_id": PERSON_CATEGORY, "bbox": box, "area": area,
-            "iscrowd": crowd, "num_keypoints": count, "keypoints": flat,
-        }
-        for extra, i, image, box, area, crowd, count, flat in zip(
-            a.extras, a.ids.tolist(), a.image_ids.tolist(), a.boxes_px.tolist(), a.areas_px2.tolist(),
-            a.is_crowd.astype(int).tolist(), (a.visibility[:, COCO_17] > 0).sum(axis=1).tolist(),
-            triples.reshape(len(a), 3 * N_KEYPOINTS).tolist(), strict=True,
-        )
-    ]  # fmt: skip
+    columns = {
+        "id": a.ids, "image_id": a.image_ids, "category_id": np.full(len(a), PERSON_CATEGORY),
+        "bbox": a.boxes_px, "area": a.areas_px2, "iscrowd": a.is_crowd.astype(int),
+        "num_keypoints": (a.visibility[:, COCO_17] > 0).sum(axis=1),
+        "keypoints": triples.reshape(len(a), 3 * N_KEYPOINTS),
+    }  # fmt: skip
+    values = zip(*(of.tolist() for of in columns.values()), strict=True)
+    people = [e | dict(zip(columns, of, strict=True)) for e, of in zip(a.extras, values, strict=True)]
     category = {**PERSON, "keypoints": list(NAMES)}
     write_json(path, {"images": image_rows(a), "annotations": people, "categories": [category]})
 
@@ -316,7 +314,8 @@ def image_rows(annotations: Annotations) -> list[dict]:
 def read_detections(path: str | Path, annotations: Annotations | None = None) -> dict[int, Detections]:
     """Read COCO keypoint results (a list of `image_id, category_id, keypoints, score`).
 
-    An empty list is valid: nobody was found. If every result has a `file_name`, it identifies the image.
+    An empty list is valid: nobody was found. If the first result has a `file_name`, all need one, and it
+    identifies the image.
 
     Parameters
     ----------
@@ -335,38 +334,72 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     InputError
         For anything malformed: NaN, a wrong number of keypoints, an unknown image, ...
     """
-    rows = Rows.of(Path(path), "results", read_rows(Path(path)), name_key="image_id")
-    person_scores = rows.numbers("score")
-    category = PersonCategory() if annotations is None else annotations.category
-    _of_people(rows, replace(category, others=set()), {category.id, PERSON_CATEGORY} - category.others)
-    image_ids = rows.integers("image_id") if annotations is None else _images_of(rows, annotations.images)
-    triples, _ = rows.keypoints()
-    del rows  # so that large data are held in memory once
-    keypoints = triples[..., :2]
-    np.copyto(keypoints, np.nan, where=~triples.any(axis=-1, keepdims=True))
-    refuse_fractions(path, keypoints)
     found = {} if annotations is None else dict.fromkeys(annotations.images, Detections.none())
-    for image_id, chosen in rows_by_image(image_ids).items():
-        together = chosen[-1] - chosen[0] == len(chosen) - 1
-        of = slice(chosen[0], chosen[-1] + 1) if together else chosen
-        found[image_id] = Detections(keypoints[of], triples[of, :, 2], person_scores[of])
-    return found
+    for image_ids, people in detections_in_parts(path, annotations):
+        for image_id, chosen in rows_by_image(image_ids).items():
+            more = people.take(chosen)
+            found[image_id] = found[image_id].concatenate(more) if len(found.get(image_id, ())) else more
+    return dict(sorted(found.items())) if annotations is None else found
 
 
-def _images_of(rows: Rows, images: Mapping[int, ImageInfo]) -> np.ndarray:
-    """The annotated image of each result; by name if all have one, since tools number images differently."""
-    if not rows.rows or not all("file_name" in row for row in rows.rows):
-        ids = rows.integers("image_id")
-        for i in np.flatnonzero(~np.isin(ids, list(images)))[:1].tolist():
-            raise rows.error(i, f"image_id {ids[i]} is not among the annotated images")
-        return ids
-    names = rows.column("file_name", lambda name: isinstance(name, str), "a file name")
-    sources = list(dict.fromkeys(names))
-    image_of = dict(zip(sources, match_images(rows.path, sources, "id", images), strict=True))
-    for i, name in enumerate(names):
-        if image_of[name] is None:
-            raise rows.error(i, f"file_name {name[:80]!r} is not among the annotated images")
-    return np.array([image_of[name] for name in names], dtype=np.int64)
+def detections_in_parts(
+    path: str | Path, annotations: Annotations | None = None
+) -> Iterator[tuple[np.ndarray, Detections]]:
+    """As `read_detections`, some people at a time in the order of the file, so that memory need not hold it.
+
+    Parameters
+    ----------
+    path : str or Path
+        As of `read_detections`.
+    annotations : Annotations, optional
+        As of `read_detections`.
+
+    Yields
+    ------
+    image_ids : array of int, shape (n,)
+        Of each person.
+    people : Detections
+        They need not be of one image.
+
+    Raises
+    ------
+    InputError
+        As `read_detections`, also after the last part.
+    """
+    path = Path(path)
+    category = PersonCategory() if annotations is None else annotations.category
+    allowed = {category.id, PERSON_CATEGORY} - category.others
+    matcher = None if annotations is None else ImageMatcher(path, "id", annotations.images)
+    n, fractions = 0, []
+    for part in _whole_images(rows_in_parts(path)):
+        rows = Rows.of(path, "results", part, name_key="image_id", first=n)
+        n += len(rows.rows)
+        person_scores = rows.numbers("score")
+        _of_people(rows, replace(category, others=set()), allowed)
+        image_ids = rows.integers("image_id") if matcher is None else matcher.images_of(rows)
+        triples, _ = rows.keypoints()
+        keypoints = triples[..., :2]
+        np.copyto(keypoints, np.nan, where=~triples.any(axis=-1, keepdims=True))
+        fractions.append(count_fractions(keypoints))
+        yield image_ids, Detections(keypoints, triples[..., 2], person_scores)
+    refuse_fractions(path, fractions)
+
+
+def _whole_images(parts: Iterable[Any]) -> Iterator[Any]:
+    """Lists that end where another image begins, none of them empty; what is no list as it is."""
+    waiting: list = []
+    for part in parts:
+        if not isinstance(part, list):
+            yield part
+            continue
+        waiting += part
+        images = [row.get("file_name", row.get("image_id")) for row in waiting if isinstance(row, dict)]
+        end = next((i for i in range(len(images) - 1, 0, -1) if images[i] != images[i - 1]), 0)
+        if end:
+            yield waiting[:end]
+        waiting = waiting[end:]
+    if waiting:
+        yield waiting
 
 
 def write_detections(

@@ -24,13 +24,16 @@ from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.extras import require
 from hicp_lib.core.files import atomic_path, remove_left
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
-from hicp_lib.core.tables import read_table
+from hicp_lib.core.tables import read_table_in_parts
 from hicp_lib.formats.layouts import PERSON_CATEGORY
-from hicp_lib.formats.number_lists import read_people
+from hicp_lib.formats.number_lists import read_people, read_people_in_parts
 
 SUFFIXES = (".json", ".csv", ".parquet")
+_TABLES = SUFFIXES[1:]
+_KEYS = ["image_id", "person"]
 _BUFFER_BYTES = 2**20
 _PEOPLE_AT_ONCE = 1000  # per batch of a table, a row group of Parquet
+_ROWS_AT_ONCE = 2**18  # of a table that is read
 _Append = Callable[..., None]
 
 
@@ -215,17 +218,42 @@ def read_rows(path: Path) -> Any:
     InputError
         If it cannot be read, or is a table without the columns that `open_detections` writes.
     """
-    if path.suffix not in (".csv", ".parquet"):
+    if path.suffix not in _TABLES:
         return read_people(path)
+    return [row for part in _rows_of_table(path) for row in part]
+
+
+def rows_in_parts(path: Path) -> Iterator[Any]:
+    """As `read_rows`, but a list comes as several shorter ones, so that memory need not hold all of it."""
+    yield from _rows_of_table(path) if path.suffix in _TABLES else read_people_in_parts(path)
+
+
+def _rows_of_table(path: Path) -> Iterator[list[dict]]:
+    """People in parts of a table; of each person, the rows must be together, or in the same part."""
     refuse_other_suffix(path)
     columns = ("image_id", "person", "person_score", "keypoint", "u_px", "v_px", "score")
-    table = read_table(path, columns, dtype={"file_name": str})
+    waiting, keys = None, [pd.DataFrame(columns=_KEYS)]
+    for part in read_table_in_parts(path, columns, _ROWS_AT_ONCE, dtype={"file_name": str}):
+        table = part if waiting is None else pd.concat([waiting, part], ignore_index=True)
+        is_last = (table[_KEYS] == table[_KEYS].tail(1).to_numpy()).all(axis=1)
+        keys.append(table.loc[~is_last, _KEYS].drop_duplicates())
+        yield _people(path, table[~is_last])
+        waiting = table[is_last]  # this person may go on in the next part
+    if waiting is not None:
+        keys.append(waiting[_KEYS].head(1))
+        yield _people(path, waiting)
+    for image_id, person in pd.concat(keys)[lambda all: all.duplicated()].values[:1]:
+        problem = f"the rows of person {person} of image {image_id} are far apart"
+        raise InputError(f"{path}: {problem}; sort them by image_id and person")
+
+
+def _people(path: Path, table: pd.DataFrame) -> list[dict]:
     try:
         keypoints = [INDEX[name] for name in table["keypoint"]]
         values = table[["u_px", "v_px", "score"]].to_numpy(float)
-        if table.duplicated(["image_id", "person", "keypoint"]).any():
+        if table.duplicated([*_KEYS, "keypoint"]).any():
             raise ValueError("a keypoint of a person twice")
-        people = table.groupby(["image_id", "person"], sort=False, dropna=False)
+        people = table.groupby(_KEYS, sort=False, dropna=False)
         first = people[["person_score", *table.columns.intersection(["file_name"])]].first()
     except (KeyError, OSError, TypeError, ValueError) as error:  # pyarrow's and pandas' own are among these
         problem = f"{type(error).__name__}: {one_line(error)}"

@@ -45,6 +45,8 @@ class Rows:
         The objects.
     name_key : str
         Key that identifies a row in messages ("id", or "image_id").
+    first : int
+        The number of the first row in the file's list, of which this may be a part.
 
     Examples
     --------
@@ -60,9 +62,10 @@ class Rows:
     label: str
     rows: list[dict]
     name_key: str = "id"
+    first: int = 0
 
     @classmethod
-    def of(cls, path: Path, label: str, value: Any, name_key: str = "id") -> Rows:
+    def of(cls, path: Path, label: str, value: Any, name_key: str = "id", first: int = 0) -> Rows:
         """Check that a value is a list of JSON objects.
 
         Parameters
@@ -75,6 +78,8 @@ class Rows:
             What JSON gave.
         name_key : str, optional
             Key that identifies a row in messages.
+        first : int, optional
+            The number of its first row in the file.
 
         Returns
         -------
@@ -84,14 +89,14 @@ class Rows:
             raise InputError(f"{path}: {label} is {shown(value)}; expected a list of objects")
         for i, row in enumerate(value):
             if not isinstance(row, dict):
-                raise InputError(f"{path}: {label}[{i}] is {shown(row)}; expected an object")
-        return cls(path, label, value, name_key)
+                raise InputError(f"{path}: {label}[{first + i}] is {shown(row)}; expected an object")
+        return cls(path, label, value, name_key, first)
 
     def error(self, i: int, problem: str) -> InputError:
         """The error for row i."""
         name = self.rows[i].get(self.name_key)
         named = f" ({self.name_key} {name})" if type(name) is int and abs(name) <= MAX_INTEGER else ""
-        return InputError(f"{self.path}: {self.label}[{i}]{named}: {problem}")
+        return InputError(f"{self.path}: {self.label}[{self.first + i}]{named}: {problem}")
 
     def column(
         self, key: str, valid: _Check = lambda _: True, expected: str = "", default: Any = _REQUIRED

@@ -1,15 +1,15 @@
-"""Read COCO files of any size in blocks, converting keypoints to arrays on the way.
+"""Read COCO files of any size: the list of people in parts, their keypoints as arrays.
 
 A number takes 8 bytes in an array, but 32 as a Python object, plus 5 to 20 for its text.
 """
 
 import re
-import secrets
 from collections.abc import Iterator
-from itertools import accumulate, chain, count
+from contextlib import suppress
+from itertools import accumulate, chain, islice
 from mmap import mmap
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import orjson
@@ -17,10 +17,11 @@ import orjson
 from hicp_lib.core.files import MAX_BYTES, read_json, regular_file
 from hicp_lib.core.limited import raised
 
-_KEY = b'"keypoints"'
-_LIST = re.compile(rb'(?<=[{,\s])"keypoints"\s*:\s*\[([^][{}"]+)\]')
-_BLOCK_BYTES = 2**24
+_START_OF_LIST = re.compile(rb'\A\s*(?=\[)|"annotations"\s*:\s*(?=\[)')
+_BLOCK_BYTES = 2**22
 _MAX_BYTES = 4 * MAX_BYTES  # of a file; arrays of its numbers need less than half
+_MOST_STARTS = 8  # that are tried: a file may have many inner lists of that name
+_EXPECTED = "give the path of a JSON file"
 
 
 def read_people(path: str | Path) -> Any:
@@ -41,43 +42,84 @@ def read_people(path: str | Path) -> Any:
     InputError
         As `read_json`, but of a file four times as large.
     """
-    mark, parts, arrays, places = secrets.token_hex(16), list[bytes](), list[np.ndarray](), count()
-    place = f'"keypoints":"{mark}%d"'.encode()
+    people: list = []
+    for part in _parts(path):
+        some = _people_in(part)
+        _make_arrays(some)
+        people += some
+    if isinstance(part, dict) and people:
+        part["annotations"] = people
+    return people if isinstance(part, list) else part
+
+
+def read_people_in_parts(path: str | Path) -> Iterator[Any]:
+    """As `read_json`, but a list comes as several shorter ones, so that memory need not hold all of it.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Yields
+    ------
+    Any
+        Lists, or once what the file holds instead of a list.
+
+    Raises
+    ------
+    InputError
+        As `read_people`; lists may have come before.
+    """
+    with open(regular_file(path, _EXPECTED, raised(_MAX_BYTES)), "rb") as file:
+        is_list = file.read(_BLOCK_BYTES).lstrip()[:1] == b"["
+    yield from _parts(path) if is_list else [read_people(path)]
+
+
+def _parts(path: str | Path) -> Iterator[Any]:
+    """The people of a file in several lists; last, all else in it, with the last people."""
+    head, text, n = None, b"", 0  # the text before the list and from it on, the people read
     try:
-        with open(regular_file(path, "give the path of a JSON file", raised(_MAX_BYTES)), "rb") as file:
-            for block in _blocks(file):
-                found = _arrays(_LIST.findall(block))
-                parts.append(_LIST.sub(lambda _: place % next(places), block) if found else block)
-                arrays += found
-        data = orjson.loads(b"".join(parts))
+        with open(regular_file(path, _EXPECTED, raised(_MAX_BYTES)), "rb") as file:
+            while block := file.read(max(_BLOCK_BYTES, len(text))):
+                text += block
+                if head is None and (head := _before_list(text)) is not None:
+                    text = text[len(head) :]
+                end = text.rfind(b"}") + 1 if head is not None else 0
+                with suppress(orjson.JSONDecodeError):  # ends within an object: more is needed
+                    people = orjson.loads(text[:end] + b"]")[n > 0 :]
+                    text, n = b"[0" + text[end:], n + len(people)
+                    yield people
+        last, n_before = orjson.loads((head or b"") + text), min(n, 1)
     except (OSError, orjson.JSONDecodeError):
-        return read_json(path)  # raises the error
-    people = data.get("annotations") if isinstance(data, dict) else data
-    rows = [row for row in people if isinstance(row, dict)] if isinstance(people, list) else []
-    marked = [row for row in rows if isinstance(of := row.get("keypoints"), str) and of.startswith(mark)]
-    for row in marked:
-        row["keypoints"] = arrays[int(row["keypoints"].removeprefix(mark))]
-    return data if len(marked) == len(arrays) else read_json(path)
+        last, n_before = read_json(path), n  # raises the error
+    del _people_in(last)[:n_before]
+    yield last
 
 
-def _blocks(file: BinaryIO) -> Iterator[bytes]:
-    """A file's content in blocks that do not split lists of keypoints shorter than a block."""
-    rest = b""
-    while block := file.read(_BLOCK_BYTES):
-        rest += block
-        cut = max(rest.rfind(_KEY) - 1, 0) or max(len(rest) - len(_KEY), 0)
-        yield rest[:cut]
-        rest = rest[cut:]
-    yield rest
+def _before_list(text: bytes) -> bytes | None:
+    """The text before a file's list of people, if that has begun."""
+    for found in islice(_START_OF_LIST.finditer(text), _MOST_STARTS):
+        with suppress(orjson.JSONDecodeError):  # of an inner object
+            before = text[: found.end()]
+            orjson.loads(before + b"0}" if before.strip() else b"0")
+            return before
+    return None
 
 
-def _arrays(texts: list[bytes]) -> list[np.ndarray]:
-    """Arrays from the texts of lists; None if one contains anything but numbers."""
-    lists = orjson.loads(b"[[" + b"],[".join(texts) + b"]]")
-    if not set(map(type, chain.from_iterable(lists))) <= {int, float}:  # numpy would accept True as 1
-        return []
-    ends = list(accumulate(map(len, lists)))
+def _people_in(value: Any) -> list:
+    people = value.get("annotations") if isinstance(value, dict) else value
+    return people if isinstance(people, list) else []
+
+
+def _make_arrays(people: list) -> None:
+    """Make arrays of their lists of keypoints, if these contain nothing but numbers."""
+    rows = [row for row in people if isinstance(row, dict) and isinstance(row.get("keypoints"), list)]
+    lists = [row["keypoints"] for row in rows]
+    ends = list(accumulate(map(len, lists), initial=0))
     # Memory pages of their own, which return to the system as soon as the lists are no longer needed.
     numbers = np.frombuffer(mmap(-1, max(8 * ends[-1], 1)), count=ends[-1])
-    numbers[:] = np.fromiter(chain.from_iterable(lists), float, ends[-1])
-    return np.split(numbers, ends[:-1])
+    with suppress(OverflowError):  # an integer too large for floats
+        if set(map(type, chain.from_iterable(lists))) <= {int, float}:  # numpy would accept True as 1
+            numbers[:] = np.fromiter(chain.from_iterable(lists), float, ends[-1])
+            for row, start, end in zip(rows, ends, ends[1:], strict=False):
+                row["keypoints"] = numbers[start:end]

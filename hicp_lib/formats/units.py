@@ -1,5 +1,6 @@
 """Checks that a file's coordinates are pixels of its images, and its boxes x, y, width, height."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,6 @@ from hicp_lib.core.keypoints import INDEX
 
 _FRACTION = 1.5  # largest fractions of an image, with keypoints slightly outside
 _SIGNED = -0.25  # below it, fractions start at -1: those from 0 are only slightly negative
-_AT_ONCE = 2**12  # people processed at a time
 _LEAST_POINTS = 3  # fewer may be at an image's corner by chance
 _SLACK_PX = 1.0
 _FEW = 0.02  # fraction of labels outside their images that occurs in public data sets
@@ -20,15 +20,42 @@ _CERTAIN = 10  # number of people, without a contradiction
 _MUCH = 0.25  # of a box's side: nearer to the image's corner, both readings are similar
 
 
-def refuse_fractions(path: Path | str, points_px: np.ndarray, what: str = "keypoints") -> None:
-    """Refuse coordinates that are fractions of the image, from 0 or -1 to 1.
+def count_fractions(points_px: np.ndarray) -> tuple[int, int, float]:
+    """Count for `refuse_fractions`.
+
+    Parameters
+    ----------
+    points_px : array, shape (n, k, 2)
+        Of people; NaN, and 0, 0, where missing.
+
+    Returns
+    -------
+    n_people : int
+        Those with three points or more.
+    n_fractions : int
+        Those of them all of whose coordinates may be fractions of the image, from 0 or -1 to 1.
+    least : float
+        The least coordinate of these.
+    """
+    given = np.isfinite(points_px).all(axis=-1) & (points_px != 0).any(axis=-1)
+    small = ((points_px <= _FRACTION) & (points_px >= -_FRACTION)).all(axis=-1)
+    people = given.sum(axis=-1) >= min(_LEAST_POINTS, points_px.shape[-2])
+    fractions = people & (small | ~given).all(axis=-1)
+    least = points_px[fractions][given[fractions]].min(initial=0.0)
+    return int(people.sum()), int(fractions.sum()), float(least)
+
+
+def refuse_fractions(
+    path: Path | str, counts: Sequence[tuple[int, int, float]], what: str = "keypoints"
+) -> None:
+    """Refuse coordinates that are fractions of the image.
 
     Parameters
     ----------
     path : Path or str
         The file or folder, for the message.
-    points_px : array, shape (n, k, 2)
-        Of all people in it; NaN, and 0, 0, where missing.
+    counts : sequence of (int, int, float)
+        `count_fractions` of all people in it, or of parts of them.
     what : str, optional
         What they are, for the message.
 
@@ -37,16 +64,9 @@ def refuse_fractions(path: Path | str, points_px: np.ndarray, what: str = "keypo
     InputError
         If this holds for all coordinates of at least half of the people who have three points or more.
     """
-    n_people, n_fractions, least = 0, 0, 0.0
-    for of in (points_px[i : i + _AT_ONCE] for i in range(0, len(points_px), _AT_ONCE)):
-        given = np.isfinite(of).all(axis=-1) & (of != 0).any(axis=-1)
-        small = ((of <= _FRACTION) & (of >= -_FRACTION)).all(axis=-1)
-        people = given.sum(axis=-1) >= min(_LEAST_POINTS, of.shape[-2])
-        fractions = people & (small | ~given).all(axis=-1)
-        n_people, n_fractions = n_people + people.sum(), n_fractions + fractions.sum()
-        least = of[fractions][given[fractions]].min(initial=least)
+    n_people, n_fractions = (sum(of[k] for of in counts) for k in (0, 1))
     if n_fractions and 2 * n_fractions >= n_people:
-        signed = least < _SIGNED
+        signed = min(of[2] for of in counts) < _SIGNED
         span, first = ("[-1, 1]", "add 1, halve and ") if signed else ("[0, 1]", "")
         expected = f"expected pixels, {first}multiply by the image's width and height"
         raise InputError(f"{path}: {what}: all coordinates lie in {span}; {expected}")

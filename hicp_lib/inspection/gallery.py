@@ -20,7 +20,7 @@ from hicp_lib.core.files import read_json, write_bytes
 from hicp_lib.core.images import read_image, write_png
 from hicp_lib.core.keypoints import FACE, GROUPS, HANDS, LIMBS, NAMES
 from hicp_lib.core.names import is_inside
-from hicp_lib.evaluation.ap.metric_table import person_oks
+from hicp_lib.evaluation.ap.person_oks import person_oks
 from hicp_lib.formats.annotations import Annotations, rows_by_image
 from hicp_lib.formats.detection_files import read_rows
 from hicp_lib.inspection.skeletons import draw_people

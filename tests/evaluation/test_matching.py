@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hicp_lib.core.keypoints import COCO_17, SIGMAS
-from hicp_lib.evaluation.matching import MATCH_OKS, best_oks, match_best_first, matched_people, pairwise_oks
+from hicp_lib.evaluation.matching import MATCH_OKS, match_best_first, matched_people, pairwise_oks
 from tests.evaluation.made_people import make_annotations, make_detections
 
 BODY_SIGMAS = SIGMAS["halpe"][COCO_17]
@@ -46,22 +46,12 @@ def test_all_pairs_are_told_apart():
     assert fit.shape == (2, 3) and (fit[[0, 1], [1, 0]] == 1).all() and fit[:, 2].max() < 0.5
 
 
-def test_the_best_of_an_image_counts_for_who_counts():
-    flags = np.full((3, 136), 2.0)
-    flags[1, COCO_17] = 0
-    people = make_annotations(POINTS, [0, 0, 1], visibility=flags, crowd=[2], areas_px2=AREA_PX2)
-    found = {0: make_detections(np.stack([moved(0.4), moved(0.6)]))}
-    assert dict(best_oks(people, found, COCO_17, BODY_SIGMAS)) == pytest.approx({0: 0.6})
-    assert dict(best_oks(people, {}, COCO_17, BODY_SIGMAS)) == {0: 0.0}
-
-
 def test_occluded_keypoints_count_and_unlabelled_ones_do_not():
     flags = np.full((1, 136), 1.0)
     flags[0, COCO_17[3]] = 0
     people = make_annotations(POINTS[:1], [0], visibility=flags, areas_px2=AREA_PX2)
     found = make_detections(moved(0.6)[None])
     assert pairwise_oks(people, found, COCO_17, BODY_SIGMAS)[0, 0] == pytest.approx(0.6)
-    assert dict(best_oks(people, {0: found}, COCO_17, BODY_SIGMAS)) == pytest.approx({0: 0.6})
     assert matched_people(people, found, COCO_17, BODY_SIGMAS) == {0: 0}
 
 

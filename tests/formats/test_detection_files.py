@@ -30,10 +30,11 @@ def write(path, images=IMAGES):
             append(image_id, {"file_name": f"{image_id}.png"}, found)
 
 
-@pytest.mark.parametrize("at_once", [1, 2, 3, 4, 1000])
+@pytest.mark.parametrize(("at_once", "n_rows"), [(1, 10), (2, 25), (3, 26), (4, 110), (1000, 2**20)])
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_what_is_read_is_what_was_written(tmp_path, suffix, at_once, monkeypatch):
+def test_what_is_read_is_what_was_written(tmp_path, suffix, at_once, n_rows, monkeypatch):
     monkeypatch.setattr(detection_files, "_PEOPLE_AT_ONCE", at_once)
+    monkeypatch.setattr(detection_files, "_ROWS_AT_ONCE", n_rows)
     path = tmp_path / f"d{suffix}"
     write(path)
     rows = read_rows(path)
@@ -105,6 +106,18 @@ def test_a_table_of_another_kind_is_refused(tmp_path, suffix, change, told):
     table = change(pd.read_parquet(tmp_path / "d.parquet"))
     table.to_csv(path, index=False) if suffix == ".csv" else table.to_parquet(path)
     with pytest.raises(InputError, match=told):
+        read_rows(path)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_person_whose_rows_are_far_apart_is_told(tmp_path, suffix, monkeypatch):
+    write(tmp_path / "d.parquet")
+    table = pd.read_parquet(tmp_path / "d.parquet").sort_values("keypoint", kind="stable")
+    path = tmp_path / f"d{suffix}"
+    table.to_csv(path, index=False) if suffix == ".csv" else table.to_parquet(path, index=False)
+    assert len(read_rows(path)) == 6  # in one part, their order does not matter
+    monkeypatch.setattr(detection_files, "_ROWS_AT_ONCE", 30)
+    with pytest.raises(InputError, match="person 0 of image .* are far apart; sort them by image_id"):
         read_rows(path)
 
 

@@ -1,7 +1,9 @@
 """Average precision and recall of keypoint detections by COCO's protocol; its open choices: `options`."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from hicp_lib.evaluation.ap.options import VISIBLE, Options, choose
 from hicp_lib.formats.annotations import SEGMENT_OF_BOX, Annotations
 
 _AT_ONCE = 2**12  # number of images checked at a time
+_PAIRS_AT_ONCE = 2**9  # whose similarity is computed at a time, to stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -36,10 +39,6 @@ class Evaluation:
         Crowds, other people, people without a labelled keypoint of the group.
     n_images, n_detections : int
         Number of images, and of evaluated detections.
-    precision : array, shape (10, 101)
-        Per OKS threshold .5:.05:.95 at recall 0:.01:1.
-    recall : array, shape (10,)
-        Per OKS threshold.
     matches : cocoeval.Matches
         Used by the bootstrap.
     """
@@ -56,8 +55,6 @@ class Evaluation:
     n_ignored: int
     n_images: int
     n_detections: int
-    precision: np.ndarray
-    recall: np.ndarray
     matches: cocoeval.Matches
 
     def metrics(self) -> dict[str, float]:
@@ -97,50 +94,114 @@ def evaluate(
         For detections of unknown images or with non-finite scores or coordinates, for unknown groups and
         options, and for area "source" if people have none.
     """
-    objects, chosen = choose(group, options)
-    images = np.array(sorted(annotations.images), dtype=np.int64)
-    slots, found_px, present, scores = _detections_seen(detections, annotations, images, objects, chosen)
-    people = people_seen(annotations, objects, chosen)
-    truth_px, flags = _flat(people.keypoints_px, objects), _flat(people.visibility, objects)
-    boxes_px, areas_px2, is_crowd = (
-        np.repeat(of, len(objects), axis=0) for of in (people.boxes_px, people.areas_px2, people.is_crowd)
-    )
-    sigmas = SIGMAS[chosen.sigmas][objects[0]]
+    evaluator = Evaluator(annotations, group, **options)
+    for image_ids, found in in_parts(detections, annotations):
+        evaluator.add(image_ids, found)
+    return evaluator.evaluation()
 
-    def similarity(who: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        person, found = (boxes_px[who], areas_px2[who]), found_px[rows, None]
-        if chosen.outside == "count":
-            return extended_oks(truth_px[who], flags[who], *person, found, present[rows, None], sigmas)
-        return oks(truth_px[who], flags[who] > 0, *person, found, sigmas)
 
-    counts = (flags != 0).any(axis=1) & ~is_crowd
-    person_slots = _slots(np.searchsorted(images, people.image_ids), objects)
-    truth = cocoeval.People(person_slots, counts, is_crowd)
-    matches = cocoeval.match(images, truth, cocoeval.Found(slots, scores), similarity, len(objects))
-    precision, recall = cocoeval.precision_recall(matches)
-    n_people = int(matches.n_people.sum())
-    return Evaluation(
-        group=group,
-        options=chosen,
-        **{name: float(value) for name, value in cocoeval.metrics(precision, recall).items()},
-        n_people=n_people,
-        n_ignored=len(truth.slots) - n_people,
-        n_images=len(images),
-        n_detections=len(scores),
-        precision=precision,
-        recall=recall,
-        matches=matches,
-    )
+class Evaluator:
+    """Evaluates detections that come some at a time.
+
+    Matches follow from scores and from the OKS of each detection with the people of its image, so these are
+    kept, and keypoints are not.
+
+    Parameters
+    ----------
+    annotations : Annotations
+        The truth.
+    group : str
+        As of `evaluate`.
+    **options : str
+        As of `evaluate`.
+
+    Raises
+    ------
+    InputError
+        As `evaluate`.
+    """
+
+    def __init__(self, annotations: Annotations, group: str = "body", **options: Any) -> None:
+        objects, chosen = choose(group, options)
+        self._group, self._objects, self._options, self._annotations = group, objects, chosen, annotations
+        self._rows, flags, self._areas_px2 = people_seen(annotations, objects, chosen)
+        self._flags = flags.reshape(-1, objects.shape[1])  # from here on, of each object of a person
+        self._images = np.array(sorted(annotations.images), dtype=np.int64)
+        slots = self._slots(annotations.image_ids[self._rows])
+        is_crowd = np.repeat(annotations.is_crowd[self._rows], len(objects))
+        self._people = cocoeval.People(slots, (self._flags != 0).any(axis=1) & ~is_crowd, is_crowd)
+        self._by_slot = np.argsort(slots, kind="stable")
+        self._sorted_slots = slots[self._by_slot]
+        self._found = [(np.zeros(0, int), np.zeros(0), np.zeros(0, int), np.zeros(0))]
+
+    def add(self, image_ids: np.ndarray, found: Detections) -> None:
+        """Add detections; those of an image in their order.
+
+        Parameters
+        ----------
+        image_ids : array of int, shape (n,)
+            The annotated image of each.
+        found : Detections
+            Of any images.
+        """
+        objects, options = self._objects, self._options
+        points_px, of_keypoints = _flat(found.keypoints_px, objects), _flat(found.scores, objects)
+        given = np.isfinite(points_px[..., 0])
+        seen = given.any(axis=-1) | (options.absent == "count")
+        of_person = np.repeat(found.person_scores, len(objects))
+        scores = of_person if options.score == "person" else of_keypoints.mean(axis=-1)
+        slots, points_px = self._slots(image_ids)[seen], points_px[seen]
+        present = (given & (of_keypoints >= PRESENCE_CUT))[seen]
+        # Each detection makes a pair with each of the people in its slot, who are together in `_by_slot`.
+        first, past = (np.searchsorted(self._sorted_slots, slots, side) for side in ("left", "right"))
+        n = past - first
+        who = self._by_slot[np.arange(n.sum()) + np.repeat(first - np.cumsum(n) + n, n)]
+        rows, fits = np.repeat(np.arange(len(n)), n), np.empty(len(who))
+        for part in (slice(i, i + _PAIRS_AT_ONCE) for i in range(0, len(who), _PAIRS_AT_ONCE)):
+            fits[part] = self._fits(who[part], points_px[rows[part]], present[rows[part]])
+        self._found.append((slots, scores[seen], n, fits))
+
+    def _slots(self, image_ids: np.ndarray) -> np.ndarray:
+        """An image has a slot for each object of a person, so that left hands only match left hands."""
+        places, n = np.searchsorted(self._images, image_ids), len(self._objects)
+        return (places[:, None] * n + np.arange(n)).ravel()
+
+    def _fits(self, who: np.ndarray, found_px: np.ndarray, present: np.ndarray) -> np.ndarray:
+        """Similarity of objects of people, and detections."""
+        person, which = np.divmod(who, len(self._objects))
+        row = self._rows[person]
+        truth_px = self._annotations.keypoints_px[row[:, None], self._objects[which]]
+        of_person = self._annotations.boxes_px[row], self._areas_px2[person]
+        flags, sigmas = self._flags[who], SIGMAS[self._options.sigmas][self._objects[0]]
+        if self._options.outside == "count":
+            return extended_oks(truth_px, flags, *of_person, found_px, present, sigmas)
+        return oks(truth_px, flags > 0, *of_person, found_px, sigmas)
+
+    def evaluation(self) -> Evaluation:
+        """The evaluation of what was added."""
+        slots, scores, n, fits = (np.concatenate(of) for of in zip(*self._found, strict=True))
+        first = np.cumsum(n) - n
+        matches = cocoeval.match(
+            self._images, self._people, cocoeval.Found(slots, scores),
+            lambda who, rows: fits[first[rows, None] + np.arange(who.shape[1])], len(self._objects),
+        )  # fmt: skip
+        figures = cocoeval.metrics(*cocoeval.precision_recall(matches))
+        n_people = int(matches.n_people.sum())
+        return Evaluation(
+            group=self._group,
+            options=self._options,
+            **{name: float(value) for name, value in figures.items()},
+            n_people=n_people,
+            n_ignored=len(self._flags) - n_people,
+            n_images=len(self._images),
+            n_detections=len(scores),
+            matches=matches,
+        )
 
 
 def _flat(values: np.ndarray, objects: np.ndarray) -> np.ndarray:
     """Values of people, (n, 136, ...), as those of their objects, (n * n_objects, k, ...)."""
     return values[:, objects].reshape(len(values) * len(objects), objects.shape[1], *values.shape[2:])
-
-
-def _slots(image_rows: np.ndarray, objects: np.ndarray) -> np.ndarray:
-    """An image has a slot for each object of a person, so that left hands are matched to left hands only."""
-    return (image_rows[:, None] * len(objects) + np.arange(len(objects))).ravel()
 
 
 def check_detections(detections: Mapping[int, Detections], annotations: Annotations) -> None:
@@ -151,14 +212,14 @@ def check_detections(detections: Mapping[int, Detections], annotations: Annotati
     InputError
         As `evaluate`.
     """
-    for _ in _checked(detections, annotations):
+    for _ in in_parts(detections, annotations):
         pass
 
 
-def _checked(
+def in_parts(
     detections: Mapping[int, Detections], annotations: Annotations
 ) -> Iterator[tuple[np.ndarray, Detections]]:
-    """Image ids and detections, in batches of images, so that memory does not hold everything twice."""
+    """Image ids and people of detections, some images at a time, once all are checked."""
     for image_id, found in detections.items():
         if image_id not in annotations.images:
             problem = "not among the annotated images; evaluate them on their own annotations"
@@ -196,8 +257,10 @@ def _sound(found: Detections) -> np.ndarray:
     return np.isfinite(found.scores) & (absent | np.isfinite(u) & np.isfinite(v))
 
 
-def people_seen(annotations: Annotations, objects: np.ndarray, options: Options) -> Annotations:
-    """The people for an evaluation, with `visibility` and `areas_px2` according to the options.
+def people_seen(
+    annotations: Annotations, objects: np.ndarray, options: Options
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The people for an evaluation, and what of them the options change.
 
     Parameters
     ----------
@@ -210,55 +273,32 @@ def people_seen(annotations: Annotations, objects: np.ndarray, options: Options)
 
     Returns
     -------
-    Annotations
+    rows : array of int, shape (n,)
+        In `annotations`.
+    flags : array of int, shape (n, n_objects, k)
+        1 for a keypoint that counts, -1 for one outside the picture that counts, else 0.
+    areas_px2 : array, shape (n,)
+        The s² of OKS.
     """
     counts_outside = options.outside == "count"
-    flags = known_flags(annotations) if counts_outside else np.maximum(annotations.visibility, 0.0)
-    if options.labelled == "visible":
-        flags = np.where((flags >= VISIBLE) | (flags < 0), flags, 0.0)
-    labelled = (flags[:, objects] != 0).any(axis=(1, 2))
-    seen = labelled | annotations.is_crowd | (options.unlabelled == "ignore")
+    flags = (known_flags(annotations) if counts_outside else annotations.visibility)[:, objects]
+    is_inside = flags >= VISIBLE if options.labelled == "visible" else flags > 0
+    signs = is_inside.astype(np.int8) - (counts_outside & (flags < 0))
+    seen = signs.any(axis=(1, 2)) | annotations.is_crowd | (options.unlabelled == "ignore")
     if options.others == "count":
         seen &= ~annotations.is_other
-    people = replace(annotations, visibility=flags)
-    people = people if seen.all() else people.take(seen)
-    return replace(people, areas_px2=_areas(people, options.area))
+    rows = np.flatnonzero(seen)
+    return rows, signs[rows], _areas(annotations, rows, options.area)
 
 
-def _areas(people: Annotations, area: str) -> np.ndarray:
-    box = people.boxes_px[:, 2] * people.boxes_px[:, 3]
-    if area == "source":
-        return np.array([_source_area(people, i) for i in range(len(people))], dtype=float)
-    return {"segment": people.areas_px2, "box": box, "box53": SEGMENT_OF_BOX * box}[area]
-
-
-def _source_area(people: Annotations, i: int) -> float:
-    if people.is_crowd[i]:
-        return float(people.areas_px2[i])
-    value: Any = people.extras[i].get("source_area")
-    if type(value) not in (int, float):
-        raise InputError(
-            f"annotation {people.ids[i]}: has no 'source_area'; area 'source' is for HiCP folders"
-        )
-    return float(value)
-
-
-def _detections_seen(
-    detections: Mapping[int, Detections], annotations: Annotations, images: np.ndarray, objects: np.ndarray,
-    options: Options,
-) -> tuple[np.ndarray, ...]:  # fmt: skip
-    """Slots, keypoints, which of them are declared present, and scores of the evaluated objects."""
-    n, most, k = 0, len(objects) * sum(map(len, detections.values())), objects.shape[1]
-    of_all = np.empty(most, int), np.empty((most, k, 2)), np.empty((most, k), bool), np.empty(most)
-    for image_ids, found in _checked(detections, annotations):
-        points, of_keypoints = _flat(found.keypoints_px, objects), _flat(found.scores, objects)
-        given = np.isfinite(points[..., 0])
-        present = given & (of_keypoints >= PRESENCE_CUT)
-        of_person = np.repeat(found.person_scores, len(objects))
-        scores = of_person if options.score == "person" else of_keypoints.mean(axis=-1)
-        slots = _slots(np.searchsorted(images, image_ids), objects)
-        seen = given.any(axis=-1) | (options.absent == "count")
-        of, n = slice(n, n + int(seen.sum())), n + int(seen.sum())
-        for every, some in zip(of_all, (slots, points, present, scores), strict=True):
-            every[of] = some[seen]
-    return tuple(every[:n] for every in of_all)
+def _areas(people: Annotations, rows: np.ndarray, area: str) -> np.ndarray:
+    segment, of_box = people.areas_px2[rows], people.boxes_px[rows, 2:].prod(axis=1)
+    if area != "source":
+        return {"segment": segment, "box": of_box, "box53": SEGMENT_OF_BOX * of_box}[area]
+    for k in np.flatnonzero(~people.is_crowd[rows]):
+        value: Any = people.extras[rows[k]].get("source_area")
+        if type(value) not in (int, float):
+            problem = "has no 'source_area'; area 'source' is for HiCP folders"
+            raise InputError(f"annotation {people.ids[rows[k]]}: {problem}")
+        segment[k] = value
+    return segment

@@ -20,7 +20,7 @@ from hicp_lib.detectors.combined.arbitration import ArbitrationRule
 from hicp_lib.detectors.combined.hand_squares import SEED_11, SEED_11_THUNDER, SquareRule
 from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
 from hicp_lib.evaluation.ap.evaluate import evaluate
-from hicp_lib.evaluation.ap.metric_table import person_oks
+from hicp_lib.evaluation.ap.person_oks import person_oks
 from hicp_lib.evaluation.cases import Found, Truth
 from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, with_interval
 from hicp_lib.formats.annotations import Annotations, source_images

@@ -9,14 +9,12 @@ from typing import Any
 
 import pandas as pd
 
-from hicp_lib.core.detections import Detections
-from hicp_lib.core.keypoints import GROUPS, SIGMAS
+from hicp_lib.core.keypoints import GROUPS
 from hicp_lib.detectors.runtime.results import Timed
 from hicp_lib.evaluation.ap.bootstrap import Samples, difference, intervals, resample
-from hicp_lib.evaluation.ap.evaluate import Evaluation, check_detections, evaluate, people_seen
-from hicp_lib.evaluation.ap.options import choose
+from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate
+from hicp_lib.evaluation.ap.person_oks import person_oks
 from hicp_lib.evaluation.cases import Found, Truth, all_cases, per_case
-from hicp_lib.evaluation.matching import best_oks
 from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import Annotations, source_images
 
@@ -172,36 +170,3 @@ def detection_times(runs: Mapping[tuple[str, str], Mapping[int, Timed]]) -> pd.D
         for image_id, result in run.items()
     ]
     return pd.DataFrame(rows, columns=["subset", "detector", "image_id", "time_ms", "workers"])
-
-
-def person_oks(
-    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body", **options: Any
-) -> pd.DataFrame:
-    """OKS of the best detection of each evaluated person, 0 if there is none.
-
-    Parameters
-    ----------
-    annotations : Annotations
-        The truth.
-    detections : mapping of int to Detections
-        By image id.
-    group : str
-        A key of `OBJECTS`.
-    **options : str
-        Fields of `Options`.
-
-    Returns
-    -------
-    DataFrame
-        Columns `image_id, annotation_id, oks, n_labelled`.
-    """
-    objects, chosen = choose(group, options)
-    check_detections(detections, annotations)
-    people = people_seen(annotations, objects, chosen)
-    rows = [
-        (people.image_ids[i], people.ids[i], fit, int((people.visibility[i, keypoints] > 0).sum()))
-        for keypoints in objects
-        for i, fit in best_oks(people, detections, keypoints, SIGMAS[chosen.sigmas][keypoints])
-    ]
-    types = {"image_id": int, "annotation_id": int, "oks": float, "n_labelled": int}
-    return pd.DataFrame(rows, columns=list(types)).astype(types)

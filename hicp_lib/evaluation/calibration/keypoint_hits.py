@@ -49,7 +49,6 @@ def keypoint_hits(
     annotations: Annotations,
     detections: Mapping[int, Detections],
     group: str = "body",
-    sigmas: str = "halpe",
     min_term: float = HIT_TERM,
 ) -> pd.DataFrame:
     """Which detected keypoints are hits, for those with known truth.
@@ -66,8 +65,6 @@ def keypoint_hits(
         By image id.
     group : {"body", "hand"}
         Of keypoints.
-    sigmas : {"halpe", "wholebody"}
-        Constants of the keypoints.
     min_term : float, optional
         A hit's minimum term of OKS.
 
@@ -82,11 +79,11 @@ def keypoint_hits(
         As `hicp_lib.evaluation.ap.evaluate.evaluate`.
     """
     check_detections(detections, annotations)
-    keypoints = GROUPS[group]
+    keypoints, sigmas = GROUPS[group], SIGMAS["halpe"][GROUPS[group]]
     rows: list[tuple] = []
     for image_id, found in detections.items():
         people = annotations.take(annotations.image_ids == image_id)
-        for row, known, terms in _judged(people, found, keypoints, SIGMAS[sigmas][keypoints]):
+        for row, known, terms in _judged(people, found, keypoints, sigmas):
             at = keypoints[known]
             columns = (at.tolist(), found.scores[row, at].tolist(), (terms[known] >= min_term).tolist())
             rows += [(image_id, *values) for values in zip(*columns, strict=True)]

@@ -29,7 +29,7 @@ from hicp_lib.datasets.visibility import MIN_PEOPLE
 from hicp_lib.evaluation.ap.evaluate import check_detections
 from hicp_lib.evaluation.cases import Found, Truth, per_case
 from hicp_lib.evaluation.matching import matched_people
-from hicp_lib.formats.annotations import Annotations
+from hicp_lib.formats.annotations import Annotations, rows_by_image
 
 KINDS = ("good", "jitter", "inversion", "swap", "miss", "not given", "not found")
 HITS = ("good", "jitter")
@@ -43,7 +43,7 @@ def all_errors(truth: Truth, found: Found) -> pd.DataFrame:
 
 
 def keypoint_errors(
-    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body", sigmas: str = "halpe"
+    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body"
 ) -> pd.DataFrame:
     """The kind of error of every labelled keypoint of the evaluated people.
 
@@ -55,8 +55,6 @@ def keypoint_errors(
         By image id.
     group : {"body", "hand"}
         Of keypoints.
-    sigmas : {"halpe", "wholebody"}
-        Constants of the keypoints.
 
     Returns
     -------
@@ -70,10 +68,9 @@ def keypoint_errors(
         As `hicp_lib.evaluation.ap.evaluate.evaluate`.
     """
     check_detections(detections, annotations)
-    keypoints, constants = GROUPS[group], SIGMAS[sigmas][GROUPS[group]]
+    keypoints, constants = GROUPS[group], SIGMAS["halpe"][GROUPS[group]]
     parts = [pd.DataFrame(columns=list(_DTYPES)).astype(_DTYPES)]
-    rows_of = pd.Series(range(len(annotations))).groupby(annotations.image_ids).indices
-    for image_id, rows in rows_of.items():
+    for image_id, rows in rows_by_image(annotations.image_ids).items():
         people = annotations.take(rows)
         found = detections.get(image_id, Detections.none())
         matched = matched_people(people, found, keypoints, constants)

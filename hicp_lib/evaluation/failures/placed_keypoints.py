@@ -13,11 +13,11 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import COCO_17, SIGMAS
 from hicp_lib.core.oks import oks_terms
-from hicp_lib.datasets.crops import with_outside
+from hicp_lib.datasets.crops import image_sizes, with_outside
 from hicp_lib.evaluation.calibration.keypoint_hits import HIT_TERM
 from hicp_lib.evaluation.cases import Found, Truth
 from hicp_lib.evaluation.matching import matched_people
-from hicp_lib.formats.annotations import Annotations, source_images
+from hicp_lib.formats.annotations import Annotations, rows_by_image, source_images
 
 # True state of a keypoint: visible in the picture, occluded in the picture, outside the picture, or unknown
 # (not labelled in the source image).
@@ -56,7 +56,7 @@ def placed_keypoints(truth: Truth, found: Found, source: Annotations) -> pd.Data
 
 def _of_case(people: Annotations, run: Mapping[int, Detections], subset: str, detector: str) -> pd.DataFrame:
     """The rows of one detector on one subset."""
-    rows_of = pd.Series(range(len(people))).groupby(people.image_ids).indices
+    rows_of = rows_by_image(people.image_ids)
     pairs = [
         (rows_of[image_id][person], detections, row)
         for image_id, detections in run.items()
@@ -72,13 +72,11 @@ def _of_case(people: Annotations, run: Mapping[int, Detections], subset: str, de
     state = np.select([flags >= 2, flags > 0, flags < 0], STATES[:3], STATES[3])
     given = np.isfinite(points_px).all(axis=-1)
     terms = oks_terms(points_px - true_px, people.areas_px2[who], _SIGMAS)
-    images = [people.images[i] for i in people.image_ids[who].tolist()]
-    sizes_px = np.array([(image.width_px, image.height_px) for image in images]).reshape(-1, 1, 2)
-    x, y = np.moveaxis((points_px + 0.5) / sizes_px, -1, 0)
-    sources = source_images(people)
+    x, y = np.moveaxis((points_px + 0.5) / image_sizes(people)[who][:, None], -1, 0)
+    sources, image_ids = source_images(people), people.image_ids[who]
     of_person = {
-        "subset": subset, "detector": detector, "image_id": people.image_ids[who],
-        "source_image": [sources[image.id] for image in images],
+        "subset": subset, "detector": detector, "image_id": image_ids,
+        "source_image": [sources[i] for i in image_ids.tolist()],
     }  # fmt: skip
     of_keypoint = {
         "keypoint": np.broadcast_to(COCO_17, flags.shape), "state": state, "given": given,

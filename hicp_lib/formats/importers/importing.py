@@ -9,6 +9,7 @@ the annotated images, scores are scaled to [0, 1], and the matching is summarise
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,14 +17,14 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.images import inside
-from hicp_lib.formats.annotations import Annotations
-from hicp_lib.formats.importers.matching import match_images
+from hicp_lib.formats.annotations import Annotations, rows_by_image
+from hicp_lib.formats.importers.matching import ImageMatcher
 from hicp_lib.formats.importers.mmpose import read_mmpose
 from hicp_lib.formats.importers.openpose import read_openpose, refuse_other_size
 from hicp_lib.formats.importers.people import People
 from hicp_lib.formats.importers.results import ALPHAPOSE, COCO, DETECTRON2, read_results
 from hicp_lib.formats.importers.scores import score_scale
-from hicp_lib.formats.units import refuse_fractions
+from hicp_lib.formats.units import count_fractions, refuse_fractions
 
 _LEAST_IMAGES = 5  # needed to decide whether coordinates are of another size
 _OFF, _ALIKE = np.log(1.25), 0.1  # logarithms of ratios: another size, and equal in both directions
@@ -34,66 +35,6 @@ READERS: dict[str, Callable[[Path], People]] = {
     "detectron2": lambda path: read_results(path, DETECTRON2),
     "coco": lambda path: read_results(path, COCO),
 }
-
-
-@dataclass(frozen=True)
-class Summary:
-    """What an import found, and how it matched the images.
-
-    Attributes
-    ----------
-    format : str
-        The tool's.
-    n_images : int
-        Annotated images.
-    n_with_people, n_without_people : int
-        Images that the files mention, with and without people.
-    n_not_mentioned : int
-        Images that the files do not mention: nobody was found there, or the tool did not process them.
-    unmatched : tuple of str
-        Images in the files that are not annotated; their people are left out.
-    n_people : int
-        People imported.
-    conventions : dict of str to int
-        People per keypoint convention, unmatched ones included.
-    score_range : tuple of float
-        Lowest, median and highest keypoint score as the tool wrote them.
-    score_scale : float
-        What they were divided by.
-    n_cut : int
-        How many of them were then clipped to 1.
-    n_keypoints, n_outside : int
-        Keypoints given, and those outside their image.
-    """
-
-    format: str
-    n_images: int
-    n_with_people: int
-    n_without_people: int
-    n_not_mentioned: int
-    unmatched: tuple[str, ...]
-    n_people: int
-    conventions: dict[str, int]
-    score_range: tuple[float, float, float]
-    score_scale: float
-    n_cut: int
-    n_keypoints: int
-    n_outside: int
-
-    def lines(self) -> list[str]:
-        """The summary as text lines."""
-        low, middle, high = self.score_range
-        scaled = f"divided by {self.score_scale:g}" if self.score_scale != 1 else "taken as they are"
-        unmatched = ", ".join(map(repr, self.unmatched[:3])) + (", ..." if len(self.unmatched) > 3 else "")
-        return [
-            f"{self.format}: {self.n_people} people in {self.n_with_people} of {self.n_images} images; "
-            f"{self.n_without_people} with nobody, {self.n_not_mentioned} not mentioned",
-            "people per convention: " + ", ".join(f"{name} {n}" for name, n in self.conventions.items()),
-            f"keypoint scores {low:.3g} to {high:.3g}, median {middle:.3g}: {scaled}, {self.n_cut} cut to 1",
-            f"keypoints outside their image: {self.n_outside} of {self.n_keypoints}",
-            f"not annotated and left out: {len(self.unmatched)} images"
-            + (f" ({unmatched})" if unmatched else ""),
-        ]
 
 
 @dataclass(frozen=True)
@@ -108,13 +49,19 @@ class Imported:
     extras : dict of int to list of dict
         By image id, per person `raw_keypoint_scores` (136 in Halpe's order, 0 where not given) and the
         further keys of the tool's file, such as its box.
-    summary : Summary
-        How the predictions matched the images.
+    summary : dict
+        How the predictions matched the images, ready for JSON: `format`; `n_images` annotated; those that the
+        files mention, `n_with_people` and `n_without_people`; `n_not_mentioned`, where nobody was found or
+        the tool did not look; `unmatched`, images in the files that are not annotated, whose people are left
+        out; `n_people` imported; `conventions`, people per keypoint convention, unmatched ones included;
+        `score_range`, lowest, median and highest keypoint score as the tool wrote them; `score_scale`, what
+        they were divided by, and `n_cut`, how many were then clipped to 1; `n_keypoints` given, and
+        `n_outside` of their image.
     """
 
     detections: dict[int, Detections]
     extras: dict[int, list[dict]]
-    summary: Summary
+    summary: dict[str, Any]
 
 
 def import_predictions(
@@ -147,8 +94,8 @@ def import_predictions(
     if scale is not None and not 0 < scale < np.inf:
         raise InputError(f"--score-scale is {scale:g}; expected a positive number")
     people = READERS[format](Path(path))
-    refuse_fractions(people.path, people.keypoints_px)
-    matched = match_images(people.path, people.sources, people.named_by, annotations.images)
+    refuse_fractions(people.path, [count_fractions(people.keypoints_px)])
+    matched = ImageMatcher(people.path, people.named_by, annotations.images).match(people.sources)
     scale = score_scale(format, people) if scale is None else scale
     rows = np.flatnonzero([matched[s] is not None for s in people.source_of])
     shown = [annotations.images[i] for s in people.source_of if (i := matched[s]) is not None]
@@ -185,10 +132,8 @@ def _by_image(
     raw = people.raw_scores.tolist()
     detections = dict.fromkeys(annotations.images, Detections.none())
     extras: dict[int, list[dict]] = {image: [] for image in annotations.images}
-    order = np.argsort(people.source_of, kind="stable")
-    starts = np.searchsorted(people.source_of[order], np.arange(1, len(matched)))
-    for image, rows in zip(matched, np.split(order, starts), strict=bool(matched)):
-        if image is not None:
+    for source, rows in rows_by_image(people.source_of).items():
+        if (image := matched[source]) is not None:
             points = people.keypoints_px[rows]
             detections[image] = Detections(points, scores[rows], people.person_scores[rows])
             extras[image] = [people.extras[i] | {"raw_keypoint_scores": raw[i]} for i in rows.tolist()]
@@ -198,16 +143,41 @@ def _by_image(
 def _summary(
     format: str, people: People, matched: list[int | None], annotations: Annotations, rows: np.ndarray,
     sizes_px: np.ndarray, scale: float,
-) -> Summary:  # fmt: skip
+) -> dict[str, Any]:  # fmt: skip
     points, raw = people.keypoints_px[rows], people.raw_scores[rows]
     given = np.isfinite(points).all(axis=-1)
     outside = given & ~inside(points, (0, 0, *sizes_px.T[..., None]))
     n_mentioned = sum(image is not None for image in matched)
-    n_with = len(set(people.source_of[rows].tolist()))
-    unmatched = tuple(str(s) for s, image in zip(people.sources, matched, strict=True) if image is None)
-    low, middle, high = np.quantile(raw[given], [0, 0.5, 1]).tolist() if given.any() else (0.0, 0.0, 0.0)
-    n, counts = len(annotations.images), (int((raw > scale).sum()), int(given.sum()), int(outside.sum()))
-    return Summary(
-        format, n, n_with, n_mentioned - n_with, n - n_mentioned, unmatched, len(rows),
-        dict(people.conventions), (low, middle, high), float(scale), *counts,
-    )  # fmt: skip
+    n_images, n_with = len(annotations.images), len(set(people.source_of[rows].tolist()))
+    return {
+        "format": format,
+        "n_images": n_images,
+        "n_with_people": n_with,
+        "n_without_people": n_mentioned - n_with,
+        "n_not_mentioned": n_images - n_mentioned,
+        "unmatched": [str(s) for s, image in zip(people.sources, matched, strict=True) if image is None],
+        "n_people": len(rows),
+        "conventions": dict(people.conventions),
+        "score_range": np.quantile(raw[given], [0, 0.5, 1]).tolist() if given.any() else [0.0, 0.0, 0.0],
+        "score_scale": float(scale),
+        "n_cut": int((raw > scale).sum()),
+        "n_keypoints": int(given.sum()),
+        "n_outside": int(outside.sum()),
+    }
+
+
+def summary_lines(summary: dict[str, Any]) -> list[str]:
+    """The summary of an import as text lines."""
+    low, middle, high = summary["score_range"]
+    scale, n_cut, unmatched = (summary[key] for key in ("score_scale", "n_cut", "unmatched"))
+    scaled = f"divided by {scale:g}" if scale != 1 else "taken as they are"
+    named = f" ({', '.join(map(repr, unmatched[:3]))}{', ...' if len(unmatched) > 3 else ''})"
+    per_convention = ", ".join(f"{name} {n}" for name, n in summary["conventions"].items())
+    return [
+        "{format}: {n_people} people in {n_with_people} of {n_images} images; "
+        "{n_without_people} with nobody, {n_not_mentioned} not mentioned".format(**summary),
+        f"people per convention: {per_convention}",
+        f"keypoint scores {low:.3g} to {high:.3g}, median {middle:.3g}: {scaled}, {n_cut} cut to 1",
+        "keypoints outside their image: {n_outside} of {n_keypoints}".format(**summary),
+        f"not annotated and left out: {len(unmatched)} images{named if unmatched else ''}",
+    ]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hicp_lib.core.detections import Detections
+from hicp_lib.evaluation.ap import cocoeval
 from hicp_lib.evaluation.ap.evaluate import evaluate
 from tests.evaluation.by_pycocotools import figures, run_pycocotools
 
@@ -17,8 +18,9 @@ def assert_the_same(annotations, detections, group) -> float:
     """AP; also the matches themselves are compared."""
     run = run_pycocotools(annotations, detections, group)
     ours = evaluate(annotations, detections, group, score="person")
-    assert np.array_equal(run.eval["precision"][:, :, 0, 0, 0], ours.precision)
-    assert np.array_equal(run.eval["recall"][:, 0, 0, 0], ours.recall)
+    precision, recall = cocoeval.precision_recall(ours.matches)
+    assert np.array_equal(run.eval["precision"][:, :, 0, 0, 0], precision)
+    assert np.array_equal(run.eval["recall"][:, 0, 0, 0], recall)
     assert ours.metrics() == figures(run)
     of_all_areas = [image for image in run.evalImgs[: len(annotations.images)] if image is not None]
     assert ours.n_people == sum(
@@ -98,5 +100,5 @@ def test_similarities_on_a_threshold_match(annotated, detected):
         found[n, 94 + n :] += 5000
     detections = {i: detected([found[i]], [1 - i / 100]) for i in range(20)}
     assert_the_same(people, detections, "hand")
-    recall = evaluate(people, detections, "hand").recall
+    _, recall = cocoeval.precision_recall(evaluate(people, detections, "hand").matches)
     assert recall.tolist() == [np.mean(np.arange(20) / 20 >= t) for t in np.linspace(0.5, 0.95, 10)]

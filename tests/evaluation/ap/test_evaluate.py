@@ -8,8 +8,8 @@ import pytest
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import HANDS, SIGMAS
-from hicp_lib.evaluation.ap.evaluate import evaluate
-from hicp_lib.evaluation.ap.metric_table import person_oks
+from hicp_lib.evaluation.ap.evaluate import Evaluator, evaluate, in_parts
+from hicp_lib.evaluation.ap.person_oks import person_oks
 from hicp_lib.formats.annotations import read_detections, write_detections
 
 RNG = np.random.default_rng(1)
@@ -74,6 +74,18 @@ def test_only_the_twenty_best_of_an_image_take_part(annotated, detected):
 def test_says_nothing(scene, capsys):
     evaluate(*scene(0))
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("options", [{}, {"absent": "count"}, {"outside": "count"}, {"score": "group"}])
+@pytest.mark.parametrize("group", ["body", "hand", "each hand"])
+def test_detections_may_come_in_any_parts(scene, group, options):
+    annotations, detections = scene(3)
+    evaluator = Evaluator(annotations, group, **options)
+    for image_ids, found in in_parts(detections, annotations):
+        for of in (slice(start, start + 3) for start in range(0, len(found), 3)):
+            evaluator.add(image_ids[of], found.take(of))
+    whole = evaluate(annotations, detections, group, **options)
+    assert evaluator.evaluation().row() == whole.row() and whole.n_people and whole.AP > 0
 
 
 # ---- options, one case each

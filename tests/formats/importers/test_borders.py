@@ -11,7 +11,7 @@ from native_files import write_mmpose, write_openpose
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import BODY
 from hicp_lib.formats.importers.importing import import_predictions
-from hicp_lib.formats.importers.matching import match_images
+from hicp_lib.formats.importers.matching import ImageMatcher
 from hicp_lib.formats.importers.openpose import refuse_other_size
 from hicp_lib.formats.importers.people import People
 from hicp_lib.formats.importers.scores import score_scale
@@ -112,14 +112,14 @@ def test_numbers_of_eighteen_digits_name_an_image_and_longer_ones_none():
     numbers = {1: "1" * 18, 2: "2" * 19}
     images = annotated({i: f"frame_{number}_x.png" for i, number in numbers.items()}).images
     sources = (int(numbers[1]),)
-    assert match_images(PATH, sources, "number", images) == [1]
+    assert ImageMatcher(PATH, "number", images).match(sources) == [1]
     with pytest.raises(InputError, match="none of its 1 images is annotated"):
-        match_images(PATH, (int(numbers[2]),), "number", images)
+        ImageMatcher(PATH, "number", images).match((int(numbers[2]),))
 
 
 def test_a_whole_path_goes_before_a_name_and_a_name_before_a_stem():
     images = annotated({1: "a/x.png", 2: "b/x.png", 3: "y.jpg", 4: "c/z.png"}).images
     names = ("b/x.png", "d\\y.jpg", "z.jpg", "nowhere.png")
-    assert match_images(PATH, names, "id", images) == [2, 3, 4, None]
+    assert ImageMatcher(PATH, "id", images).match(names) == [2, 3, 4, None]
     with pytest.raises(InputError, match=r"'x.png' could be a/x.png and b/x.png"):
-        match_images(PATH, ("x.png",), "id", images)
+        ImageMatcher(PATH, "id", images).match(("x.png",))

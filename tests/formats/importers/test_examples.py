@@ -28,8 +28,8 @@ def test_every_example_goes_from_import_to_evaluation(tmp_path, format):
     scale = 10 if format == "mmpose" else None  # RTMW's
     imported = import_predictions(format, EXAMPLES / format, people, scale)
     summary = imported.summary
-    assert (summary.n_people, summary.n_with_people, len(summary.unmatched)) == (3, 2, 1)
-    assert summary.score_scale == (10 if format == "mmpose" else 1)
+    assert (summary["n_people"], summary["n_with_people"], len(summary["unmatched"])) == (3, 2, 1)
+    assert summary["score_scale"] == (10 if format == "mmpose" else 1)
     write_detections(tmp_path / "d.json", imported.detections, imported.extras)
     found = read_detections(tmp_path / "d.json", people)
     # Some six pixels off on people 400 px high: found at OKS .5 all, and nobody else.

@@ -1,7 +1,6 @@
 """What comes out of another tool's files is who was put in, to the format's precision."""
 
 import json
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +19,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.evaluation.ap.evaluate import check_detections
 from hicp_lib.formats.annotations import read_detections, write_detections
-from hicp_lib.formats.importers.importing import Summary, import_predictions
+from hicp_lib.formats.importers.importing import import_predictions, summary_lines
 from tests.formats.importers.native_people import NAMES, annotated, make_person
 
 IDS = {name: i for i, name in NAMES.items()}
@@ -152,11 +151,11 @@ def test_mmpose_scores_keep_their_order(tmp_path, images, highest, scale):
     write_mmpose(tmp_path, {NAMES[785]: [make_person(scores=scores, score=0.5)]}, "halpe136")
     imported = import_predictions("mmpose", tmp_path, images, scale)
     people, scale = imported.detections[785], scale or 1
-    assert imported.summary.score_scale == scale
+    assert imported.summary["score_scale"] == scale
     assert np.allclose(people.scores[0], np.minimum(scores / scale, 1), rtol=1e-6)
     assert (np.diff(people.scores[0]) >= 0).all()
     assert np.allclose(imported.extras[785][0]["raw_keypoint_scores"], scores, rtol=1e-6)
-    assert imported.summary.n_cut == (scores > scale).sum()
+    assert imported.summary["n_cut"] == (scores > scale).sum()
     # MMPose's own ranking: the box times the mean of scores above 0.2, in its own scale.
     assert people.person_scores[0] == pytest.approx(0.5 * scores[scores > 0.2].mean())
 
@@ -194,20 +193,20 @@ def test_the_summary_says_what_matched(tmp_path, images, found):
     del found[NAMES[2006]]
     write_openpose(tmp_path, found)
     summary = import_predictions("openpose", tmp_path, images).summary
-    assert (summary.n_images, summary.n_with_people, summary.n_without_people) == (3, 1, 1)
-    assert (summary.n_not_mentioned, summary.n_people, summary.unmatched) == (1, 2, ("elsewhere",))
-    assert summary.conventions["openpose_body25"] == 3 and summary.conventions["left_hand21"] == 3
-    assert summary.n_outside == 0 and summary.n_keypoints == 2 * 135
-    text = "\n".join(summary.lines())
+    assert (summary["n_images"], summary["n_with_people"], summary["n_without_people"]) == (3, 1, 1)
+    assert (summary["n_not_mentioned"], summary["n_people"], summary["unmatched"]) == (1, 2, ["elsewhere"])
+    assert summary["conventions"]["openpose_body25"] == 3 and summary["conventions"]["left_hand21"] == 3
+    assert summary["n_outside"] == 0 and summary["n_keypoints"] == 2 * 135
+    text = "\n".join(summary_lines(summary))
     assert "2 people in 1 of 3 images" in text and "elsewhere" in text and "openpose_body25 3" in text
-    json.dumps(asdict(summary), allow_nan=False)
+    json.dumps(summary, allow_nan=False)
 
 
 def test_keypoints_outside_the_image_are_counted(tmp_path, images):
     points = make_person().points_px.copy()
     points[:5] = [[-0.5, 0], [639.5, 479.5], [-0.6, 0], [0, 479.6], [640, 0]]
     write_mmpose(tmp_path, {NAMES[785]: [make_person(points_px=points)]}, "coco17")
-    assert import_predictions("mmpose", tmp_path, images).summary.n_outside == 4
+    assert import_predictions("mmpose", tmp_path, images).summary["n_outside"] == 4
 
 
 def test_images_are_found_by_name_in_any_folder(tmp_path):
@@ -265,5 +264,7 @@ def test_mmpose_without_boxes_ranks_by_keypoints(tmp_path, images):
 
 @pytest.mark.parametrize(("names", "told"), [("abc", "'a', 'b', 'c'"), ("abcd", "'a', 'b', 'c', ...")])
 def test_of_images_that_are_not_annotated_three_are_named(names, told):
-    summary = Summary("coco", 1, 0, 0, 1, tuple(names), 0, {}, (0.0, 0.0, 0.0), 1.0, 0, 0, 0)
-    assert summary.lines()[-1] == f"not annotated and left out: {len(names)} images ({told})"
+    counts = "n_images n_with_people n_without_people n_not_mentioned n_people n_cut n_keypoints n_outside"
+    summary = dict.fromkeys(counts.split(), 0) | {"format": "coco", "unmatched": list(names)}
+    summary |= {"conventions": {}, "score_range": [0.0, 0.0, 0.0], "score_scale": 1.0}
+    assert summary_lines(summary)[-1] == f"not annotated and left out: {len(names)} images ({told})"

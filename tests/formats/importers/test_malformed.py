@@ -20,7 +20,7 @@ from native_files import (
 from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.ap.evaluate import check_detections
 from hicp_lib.formats.annotations import write_detections
-from hicp_lib.formats.importers.importing import import_predictions
+from hicp_lib.formats.importers.importing import import_predictions, summary_lines
 from tests.formats.importers.native_people import NAMES, annotated, make_person
 
 IDS = {name: i for i, name in NAMES.items()}
@@ -235,7 +235,7 @@ def test_nothing_else_escapes(sound, kind, data):
     check_detections(imported.detections, annotated(NAMES))
     for people in imported.detections.values():
         assert ((people.scores >= 0) & (people.scores <= 1)).all()
-    for line in imported.summary.lines():
+    for line in summary_lines(imported.summary):
         assert line.encode() and line.isprintable()
     write_detections(folder / "out" / "d.json", imported.detections, imported.extras)
 

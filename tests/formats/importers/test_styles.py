@@ -20,7 +20,7 @@ from hicp_lib.core.keypoints import INDEX
 from hicp_lib.formats import exporters
 from hicp_lib.formats.annotations import write_detections
 from hicp_lib.formats.detection_files import SUFFIXES
-from hicp_lib.formats.importers.importing import READERS, import_predictions
+from hicp_lib.formats.importers.importing import READERS, import_predictions, summary_lines
 from tests.formats.importers.native_people import NAMES, annotated, make_person
 
 IMAGE = NAMES[785]
@@ -157,7 +157,7 @@ def test_an_empty_list_is_nobody(tmp_path, images, format):
     file.write_text("[]")
     imported = import_predictions(format, tmp_path if format in ("openpose", "mmpose") else file, images)
     assert [len(people) for people in imported.detections.values()] == [0, 0, 0]
-    assert "0 people in 0 of 3 images" in imported.summary.lines()[0]
+    assert "0 people in 0 of 3 images" in summary_lines(imported.summary)[0]
 
 
 # ---- scores
@@ -183,7 +183,7 @@ def test_one_scale_for_one_detector(tmp_path, images):
     for k, scores in enumerate((np.full(136, 0.9), np.linspace(0.1, 4, 136))):
         write_mmpose(tmp_path / str(k), {IMAGE: [make_person(scores=scores)]})
         try:
-            scales.add(import_predictions("mmpose", tmp_path / str(k), images).summary.score_scale)
+            scales.add(import_predictions("mmpose", tmp_path / str(k), images).summary["score_scale"])
         except InputError as error:
             assert "the same for every folder of this detector" in str(error)
     assert scales == {1.0}
