@@ -85,15 +85,11 @@ def run_on_cluster(
         for key, answer in _spread(client, address, chain([first], todo), how, named):
             if isinstance(answer, Exception):
                 raise answer
-            yield key, answer if folder is None or answer is None else _written(answer, folder, str(key))
-
-
-def _written(answer: tuple[Any, dict[str, bytes]], folder: Path, last: str) -> Any:
-    """What a job returned, its files written."""
-    result, files = answer
-    for name in sorted(files, key=lambda name: name == last):
-        write_bytes(folder / name, files[name])
-    return result
+            if folder is not None and answer is not None:
+                answer, files = answer
+                for name in sorted(files, key=str(key).__eq__):  # the one that the key names is the last
+                    write_bytes(folder / name, files[name])
+            yield key, answer
 
 
 @contextmanager
