@@ -12,7 +12,7 @@ from hicp_lib.core.images import read_image
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
-from hicp_lib.study.plots.people import draw_detections, picture_grid, title_pictures
+from hicp_lib.study.plots.people import draw_detections, picture_grid
 from hicp_lib.study.plots.style import TEXTS, WIDTH_IN, Figure, in_style, texts
 
 _UNITS = {"distance": "{:g} m", "resolution": "{:g} px"}
@@ -57,8 +57,7 @@ def dose_pictures(
             rows.setdefault(dose, []).append(image)
             titles.append(_UNITS.get(dose, "{:.0%}").format(level))
     told = texts("dose_pictures", doses=list(rows), n=len(titles), seen=pd.Series(n_found))
-    drawn = picture_grid(list(rows.values()), *told, row_titles=list(rows), cell_in=1)
-    title_pictures(drawn, titles, 8)
+    drawn = picture_grid(list(rows.values()), *told, list(rows), titles, cell_in=1, title_pt=8)
     marks.add_keys(drawn.figure.axes[0], detectors, {})
     marks.legend_below(drawn.figure, drawn.figure.axes[0])
     return drawn

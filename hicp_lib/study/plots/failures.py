@@ -20,7 +20,7 @@ from hicp_lib.inspection.skeletons import draw_rings
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.evaluation import GROUP_TITLES
 from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid, title_pictures
+from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
 from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_lines, in_style, new_figure, texts
 
 _TRUTH_COLOUR = "#39D353"
@@ -166,11 +166,8 @@ def invented_heads(heads: pd.DataFrame, folder: Path, truth: Annotations, found:
         titles.append(f"{detector}\nscore of the head {scores[detector, image_id]:.2f}")
     beyond = (heads["landed"] == "outside").groupby(heads["detector"], sort=False).mean()
     said = [" ".join(title.split()) for title in titles]
-    drawn = picture_grid(
-        [pictures], *texts("invented_heads", note=note, said=said, beyond=beyond), cell_in=1.8
-    )
-    title_pictures(drawn, titles, 7)
-    return drawn
+    told = texts("invented_heads", note=note, said=said, beyond=beyond)
+    return picture_grid([pictures], *told, titles=titles, cell_in=1.8, title_pt=7)
 
 
 @in_style
@@ -251,7 +248,5 @@ def gallery(
     told = {"note": note, "n": len(cases), "rows": list(dict.fromkeys(said))}
     name = "gallery" if row == "detector" else "lost_points"
     width = max(map(len, pictures.values()))
-    grid = list(pictures.values()), *texts(name, **told), list(pictures)
-    drawn = picture_grid(*grid, cell_in=WIDTH_IN / width)
-    title_pictures(drawn, titles, 7)
-    return drawn
+    grid = list(pictures.values()), *texts(name, **told), list(pictures), titles
+    return picture_grid(*grid, cell_in=WIDTH_IN / width, title_pt=7)
