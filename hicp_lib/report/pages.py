@@ -10,7 +10,9 @@ from PIL import Image
 
 _ICON = re.compile(r'[{,]"?([a-z][a-z0-9-]*)"?:\[(\d+),(\d+),\[[^\]]*\],"\w+","([^"]+)"\]')
 # Scripts of the theme that need not run before a page is drawn.
-_CAN_WAIT = re.compile(r"doctools|sphinx_highlight|clipboard|copybutton|book-theme\.js|toggle\w+\.js|design-tabs")
+_CAN_WAIT = re.compile(
+    r"doctools|sphinx_highlight|clipboard|copybutton|book-theme\.js|toggle\w+\.js|design-tabs"
+)
 # What writes an icon as a letter of a font.
 _LETTERS = re.compile(r"\.fa-[\w-]+:+before(,\.fa-[\w-]+:+before)*\{content:[^{}]*\}")
 

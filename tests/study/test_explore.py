@@ -93,7 +93,7 @@ def make_doses(folder: Path):
 def test_doses_have_pictures_of_some_and_precision_over_all(tmp_path):
     data, files = explore.doses(*make_doses(tmp_path))
     (dose,) = data["doses"]
-    assert dose["levels"] == [0.5, 2.5] and dose["unit"] == " m" and data["n_people"] == 4
+    assert dose["levels"] == ["0.5 m", "2.5 m"] and data["n_people"] == 4
     assert [len(views) for views in dose["views"]] == [3, 3] and len(files) == 6
     assert [at[0] for at in dose["ap"]] == [["mediapipe", "body", value, None, None] for value in (0.0, 1.0)]
 

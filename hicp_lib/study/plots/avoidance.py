@@ -10,7 +10,7 @@ from hicp_lib.robot.separation import Separation, separation_table
 from hicp_lib.study.avoidance import FIELD_M, MARKS_M, UNTIL, clearance, over_people
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
-from hicp_lib.study.plots.style import COLUMN_IN, Figure, in_style, new_figure, texts
+from hicp_lib.study.plots.style import COLUMN_IN, Figure, in_style, texts
 
 _GAINS = {"ours": "-", "published": "--"}
 _SCRIPT_MARKERS = "os^Dv"
@@ -95,15 +95,12 @@ def separation_terms(separations: Mapping[str, Separation], note: str) -> Figure
     """The terms of the protective separation distance and their sum: a row each, a dot per detector."""
     table = separation_table(separations)
     rows = table.melt("term", var_name="detector", value_name="value")
-    figure, axis = new_figure(1, 1, COLUMN_IN, 1.4 + 0.36 * len(table))
-    pens, terms = marks.detector_dots(separations), list(table["term"])
-    bare = {"bounds": ("value",) * 3, "factor": 100, "ms": 6, "capsize": 0}
-    marks.dots_in_rows(axis, rows, "term", "detector", terms, pens, **bare)
-    marks.name_rows(axis, terms)
-    axis.axhline(len(terms) - 1.5, color="#AAAAAA", lw=0.8)
+    bare: dict[str, Any] = {"bounds": ("value",) * 3, "factor": 100, "ms": 6, "capsize": 0}
+    pens = marks.detector_dots(separations)
+    figure, ((axis,),), _ = marks.dot_chart(rows, "term", "detector", pens, COLUMN_IN, **bare)
+    axis.axhline(len(table) - 1.5, color="#AAAAAA", lw=0.8)
     axis.axvline(100 * FIELD_M, color="#111111", lw=1, ls=":")
     axis.set(xlabel="share of the protective separation distance (cm)", xlim=(0, None))
-    marks.legend_below(figure, axis, ncols=2)
     sums = [f"{name} {100 * separation.distance_m:.0f} cm" for name, separation in separations.items()]
     largest = rows[rows["term"] != "sum"].sort_values("value").drop_duplicates("detector", keep="last")
     told = {"note": note, "sums": sums, "field_cm": 100 * FIELD_M, "largest": largest}

@@ -149,12 +149,9 @@ def labelled_share(subsets: Mapping[str, Annotations], note: str) -> Figure:
         for part, indices in _PARTS.items()
         if len(labelled)
     )
-    figure, axis = new_figure(1, 1, WIDTH_IN, 3.8)
-    pens, parts = marks.subset_dots(subsets), list(_PARTS)
-    marks.dots_in_rows(axis, table, "part", "subset", parts, pens, bounds=["share"] * 3, capsize=0)
-    axis.set(xlabel="share of people", xlim=(-0.02, 1.02))
-    marks.name_rows(axis, parts)
-    marks.legend_below(figure, axis)
+    bare: dict[str, Any] = {"bounds": ["share"] * 3, "capsize": 0}
+    figure, axes, _ = marks.dot_chart(table, "part", "subset", marks.subset_dots(subsets), WIDTH_IN, **bare)
+    axes[0, 0].set(xlabel="share of people", xlim=(-0.02, 1.02))
     least = table.sort_values("share", kind="stable").drop_duplicates("subset")
     return Figure(figure, *texts("labelled_share", note=note, said=least), table)
 

@@ -15,10 +15,20 @@ from hicp_lib.study.plots.palette import detector_colour, detector_marker
 from hicp_lib.study.plots.people import draw_detections, picture_grid
 from hicp_lib.study.plots.style import TEXTS, WIDTH_IN, Figure, in_style, texts
 
-_UNITS = {"distance": "{:g} m", "resolution": "{:g} px"}
 _LOGARITHMIC = ("light", "resolution", "distance")
 _GROUPS = {"body": "Bodies", "hand": "Hands"}
 _MEASURES = {"AP": "average precision", "visible keypoints hit": "share of visible keypoints hit"}
+
+
+def level_text(dose: str, level: float) -> str:
+    """A level of a dose in its unit.
+
+    Examples
+    --------
+    >>> level_text("distance", 2.5), level_text("light", 0.05)
+    ('2.5 m', '5%')
+    """
+    return TEXTS["levels"].get(dose, "{:.0%}").format(level)
 
 
 @in_style
@@ -55,7 +65,7 @@ def dose_pictures(
                 image = draw_detections(image, replace(people, keypoints_px=points_px), detector)
                 n_found[detector] += len(people) > 0
             rows.setdefault(dose, []).append(image)
-            titles.append(_UNITS.get(dose, "{:.0%}").format(level))
+            titles.append(level_text(dose, level))
     told = texts("dose_pictures", doses=list(rows), n=len(titles), seen=pd.Series(n_found))
     drawn = picture_grid(list(rows.values()), *told, list(rows), titles, cell_in=1, title_pt=8)
     marks.add_keys(drawn.figure.axes[0], detectors, {})

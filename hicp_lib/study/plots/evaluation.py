@@ -206,14 +206,9 @@ def time_per_image(table: pd.DataFrame, machine_note: str) -> Figure:
 @in_style
 def precisions(table: pd.DataFrame, note: str) -> Figure:
     """AP of bodies in a run and on photographs; `table` as from `hicp_lib.study.photographs.beside`."""
-    names = list(table["detector"].unique())
-    size = WIDTH_IN, 1.4 + 0.5 * len(names)
-    figure, axes, panels = marks.panels(table, ["subset"], *size, sharex=True, sharey=True)
-    for axis, rows, subset in panels:
-        marks.dots_in_rows(axis, rows, "detector", "where", names, _PENS)
+    figure, _, panels = marks.dot_chart(table, "detector", "where", _PENS, WIDTH_IN, ["subset"])
+    for axis, _, subset in panels:
         axis.set(xlabel="average precision", xlim=(0, 1))
         axis.set_title(subset.capitalize(), fontsize=9)
-    marks.name_rows(axes[0, 0], names)
-    marks.legend_below(figure, axes[0, 0], ncols=2)
     best = table.loc[table.groupby(["where", "subset"], sort=False)["value"].idxmax()]
     return Figure(figure, *texts("precisions", note=note, said=best), table)

@@ -21,7 +21,7 @@ from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.evaluation import GROUP_TITLES
 from hicp_lib.study.plots.palette import detector_colour
 from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
-from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_lines, in_style, new_figure, texts
+from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_lines, in_style, texts
 
 _TRUTH_COLOUR = "#39D353"
 _ONE_CROP = ["subset", "image_id", "annotation_id"]
@@ -63,18 +63,15 @@ def class_precision(table: pd.DataFrame, note: str) -> Figure:
     table = table[table["metric"].isin(["AP", "AR"])]
     rows = table[table["metric"] == "AP"]
     rows = rows[(rows["group"] != "body") | rows.index.isin(marks.own_bodies(rows).index)]
-    names, detectors = [name for name in CLASSES if name in set(rows["class"])], rows["detector"].unique()
-    size = WIDTH_IN, 1.4 + (0.12 + 0.1 * len(detectors)) * len(names)
-    figure, axes, panels = marks.panels(rows, ["group"], *size, sharey=True)
+    names = [name for name in CLASSES if name in set(rows["class"])]
+    pens = marks.detector_dots(rows["detector"].unique())
+    figure, axes, panels = marks.dot_chart(rows, "class", "detector", pens, WIDTH_IN, ["group"], names)
     for axis, of_group, group in panels:
-        pens = marks.detector_dots(of_group["detector"].unique())
-        marks.dots_in_rows(axis, of_group, "class", "detector", names, pens)
         _say_too_few(axis, names, set(of_group.loc[of_group["value"].isna(), "class"]))
         axis.set(xlabel="average precision", xlim=(-0.03, 1.03))
         axis.set_title(GROUP_TITLES.get(group, group), fontsize=8)
     counts = rows.drop_duplicates("class").set_index("class")["n_people"]
     marks.name_rows(axes[0, 0], [textwrap.fill(f"{name} ({counts.get(name, 0)})", 22) for name in names])
-    marks.legend_below(figure, axes, ncols=2)
     best = rows[rows["group"] == "body"].sort_values("value", ascending=False, kind="stable")
     best = best.dropna(subset="value").drop_duplicates("class")
     said = {"said": best[best["value"] >= _BLIND], "blind": list(best.loc[best["value"] < _BLIND, "class"])}
@@ -123,14 +120,11 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
 def head_change(table: pd.DataFrame, note: str) -> Figure:
     """Change of the hit rate of each keypoint when the head is cut off; from `change_per_keypoint`."""
     rows = marks.own_bodies(table)
-    names, detectors = (list(rows[name].unique()) for name in ("keypoint", "detector"))
-    figure, axis = new_figure(1, 1, WIDTH_IN, 1.2 + (0.1 + 0.1 * len(detectors)) * len(names))
-    pens, change = marks.detector_dots(detectors), ("change", "low", "high")
-    marks.dots_in_rows(axis, rows, "keypoint", "detector", names, pens, bounds=change)
-    axis.axvline(0, color="#444444", lw=1)
-    marks.name_rows(axis, [name.replace("_", " ") for name in names])
-    axis.set(xlabel="change of the share of keypoints hit, without the head")
-    marks.legend_below(figure, axis, ncols=2)
+    rows = rows.assign(keypoint=rows["keypoint"].str.replace("_", " "))
+    pens, change = marks.detector_dots(rows["detector"].unique()), ("change", "low", "high")
+    figure, axes, _ = marks.dot_chart(rows, "keypoint", "detector", pens, WIDTH_IN, bounds=change)
+    axes[0, 0].axvline(0, color="#444444", lw=1)
+    axes[0, 0].set(xlabel="change of the share of keypoints hit, without the head")
     changes = rows.groupby("detector", sort=False)["change"].mean()
     return Figure(figure, *texts("head_change", note=note, said=changes), table)
 
@@ -176,15 +170,11 @@ def false_presence(table: pd.DataFrame, note: str) -> Figure:
     rows = marks.own_bodies(table)
     rows = rows[(rows["n"] >= MIN_PEOPLE) | (rows["n"].max() < MIN_PEOPLE)]
     rows = rows.assign(row=rows["part"] + ", " + rows["subset"] + " (" + rows["n"].astype(str) + ")")
-    names, detectors, decisions = (list(rows[name].unique()) for name in ("row", "detector", "decision"))
-    size = WIDTH_IN, 1.5 + (0.1 + 0.13 * len(detectors)) * len(names)
-    figure, axes, panels = marks.panels(rows, ["decision"], *size, sharey=True)
-    for axis, of_panel, decision in panels:
-        marks.dots_in_rows(axis, of_panel, "row", "detector", names, marks.detector_dots(detectors))
+    pens = marks.detector_dots(rows["detector"].unique())
+    figure, _, panels = marks.dot_chart(rows, "row", "detector", pens, WIDTH_IN, ["decision"])
+    for axis, _, decision in panels:
         axis.set(xlim=(-0.02, None), xlabel="share given inside")
         axis.set_title(textwrap.fill(decision, 24), fontsize=8)
-    marks.name_rows(axes[0, 0], names)
-    marks.legend_below(figure, axes, ncols=2)
     heads = rows[(rows["part"] == "head") & (rows["subset"] == "headless")]
     return Figure(figure, *texts("false_presence", note=note, said=heads), table)
 

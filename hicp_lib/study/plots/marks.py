@@ -50,7 +50,7 @@ def add_keys(axis, detectors: Iterable[str], others: Mapping[str, dict[str, Any]
 
 
 def panels(table: pd.DataFrame, by: Sequence[str], width_in: float, height_in: float, **shared: Any):
-    """A figure with a panel for each value of a column (across), or of two (down, across).
+    """A figure with a panel for each value of a column (across), or of two (down, across), or with one panel.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def panels(table: pd.DataFrame, by: Sequence[str], width_in: float, height_in: f
         Of each panel its axis, its rows of the table, which may be none, and the value of each column.
     """
     values = [table[name].unique() for name in by]
-    n_rows, n_columns = [1, *(max(len(of), 1) for of in values)][-2:]
+    n_rows, n_columns = [1, 1, *(max(len(of), 1) for of in values)][-2:]
     wrap = shared.pop("wrap", n_columns)
     if n_rows == 1:
         n_rows, n_columns = -(-n_columns // wrap), min(n_columns, wrap)
@@ -201,8 +201,56 @@ def dots_in_rows(
     """
     for k, (case, pen) in enumerate(pens.items()):
         part = table[table[beside] == case]
+        if part.empty:
+            continue
         y = np.array([names.index(name) for name in part[down]]) + offset(k, len(pens), 0.8 / len(pens))
         dots(axis, part, y, **pen | shared)
+
+
+def dot_chart(
+    table: pd.DataFrame,
+    down: str,
+    beside: str,
+    pens: Mapping[str, dict],
+    width_in: float,
+    by: Sequence[str] = (),
+    names: Sequence[str] | None = None,
+    **shared: Any,
+):
+    """`panels` with `dots_in_rows`, as high as these need; rows are named, and the pens in a legend below.
+
+    Parameters
+    ----------
+    table : pd.DataFrame
+    down, beside : str
+        The columns of rows and of what stands in each.
+    pens : mapping of str to dict
+        Options of `dots` by the value of `beside`.
+    width_in : float
+        The figure's width in inches.
+    by : sequence of str
+        Columns that make the panels; none for one panel.
+    names : sequence of str, optional
+        The rows from above; by default in the order they come in.
+    **shared : dict
+        Options of all `dots`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    array of matplotlib.axes.Axes
+    list of tuple
+        As from `panels`.
+    """
+    names = list(table[down].unique() if names is None else names)
+    n_below = table[by[0]].nunique() if len(by) == 2 else 1
+    height_in = 0.9 + n_below * (0.5 + (0.12 + 0.1 * len(pens)) * len(names))
+    figure, axes, found = panels(table, by, width_in, height_in, sharex="col", sharey=True)
+    for axis, part, *_ in found:
+        dots_in_rows(axis, part, down, beside, names, pens, **shared)
+    name_rows(axes[0, 0], names)
+    legend_below(figure, axes, ncols=2)
+    return figure, axes, found
 
 
 def stacked_bars(axis, lengths: pd.DataFrame, styles: Mapping[str, dict[str, Any]]) -> None:

@@ -49,8 +49,8 @@ _NOTHING = "Nothing to draw: these data have nobody and nothing that this figure
 def in_style(draw: Callable[..., Figure | None]) -> Callable[..., Figure]:
     """Decorator: run a drawing function in the report's style, leaving Matplotlib's settings as they were.
 
-    An empty table, list or mapping is not drawn, nor is what `draw` has nothing to draw of (None): one sentence
-    stands in the figure's place.
+    An empty table, list or mapping is not drawn, nor anything where `draw` returns None: one sentence stands
+    in the figure's place.
     """
 
     @functools.wraps(draw)
