@@ -143,7 +143,8 @@ def detections_grid(
     columns = len(detectors) if len(pictures) > 1 else min(len(detectors), 2)
     shown = [(image, found[d], d) for image, found in pictures.values() for d in detectors]
     drawn = [draw_detections(*one, min_score) for one in shown]
-    seen = [f"{d} {sum(len(found[d]) > 0 for _, found in pictures.values())}" for d in detectors]
+    n_seen = {d: sum(len(found[d]) > 0 for _, found in pictures.values()) for d in detectors}
+    seen = [f"{d} {n} of {len(pictures)}" for d, n in n_seen.items()]
     said = {"min_score": min_score, "note": note and f" {note}", "pictures": list(pictures), "seen": seen}
     return picture_grid(
         [drawn[start : start + columns] for start in range(0, len(drawn), columns)],
