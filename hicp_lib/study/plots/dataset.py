@@ -16,7 +16,7 @@ from hicp_lib.formats.annotations import Annotations
 from hicp_lib.simulation.body.joints import pose_from_joints, radians
 from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import BODY_COLOUR, HEAD_COLOUR, SUBSET_COLOURS
+from hicp_lib.study.plots.palette import BODY_COLOUR, HEAD_COLOUR, STYLES
 from hicp_lib.study.plots.people import draw_truth, picture_grid
 from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_style, new_figure, texts
 
@@ -173,7 +173,7 @@ def crop_sizes(table: pd.DataFrame, min_pixels: int, note: str) -> Figure:
     sizes = sizes[sizes > 0]
     figure, axis = new_figure(1, 1, WIDTH_IN, 2.6)
     bins = np.geomspace(max(sizes.min(), 1), sizes.max() * 1.01, 30)
-    axis.hist(sizes[sizes >= min_pixels], bins, color=SUBSET_COLOURS["basic"], label="kept")
+    axis.hist(sizes[sizes >= min_pixels], bins, color=STYLES["subsets"]["basic"]["color"], label="kept")
     axis.hist(sizes[sizes < min_pixels], bins, color="#BBBBBB", label="too small")
     axis.axvline(min_pixels, color="black", lw=1.2, ls="--")
     axis.set(xscale="log", xlabel="area of the crop [px]", ylabel="people")

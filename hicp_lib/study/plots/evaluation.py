@@ -7,9 +7,8 @@ import pandas as pd
 
 from hicp_lib.evaluation.ap.found_and_placed import FOUND, OKS_OF_FOUND
 from hicp_lib.evaluation.ap.loss_shares import SHARES
-from hicp_lib.study.photographs import PHOTOGRAPHED, RENDERED
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import detector_colour, detector_marker
+from hicp_lib.study.plots.palette import STYLES, detector_colour, detector_marker
 from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_style, new_figure, texts
 
 GROUP_TITLES = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
@@ -18,14 +17,6 @@ _AP = {"AP": "average precision (.5:.95)"}
 _THRESHOLDS = {
     ".5": ("AP50", "AR50", "none"), ".75": ("AP75", "AR75", "left"), ".5:.95": ("AP", "AR", "full"),
 }  # fmt: skip
-# Marks in the row of a detector, from above: marker, and its face if not filled.
-_SUBSETS: dict[str, tuple[str, str | None]] = {
-    "whole images": ("^", None), "basic": ("o", None), "headless": ("o", "white"), "near": ("D", None),
-}  # fmt: skip
-_PENS = {
-    RENDERED: {"color": "#0072B2", "fmt": "o", "label": RENDERED},
-    PHOTOGRAPHED: {"color": "#D55E00", "fmt": "s", "label": PHOTOGRAPHED},
-}
 
 
 @in_style
@@ -157,18 +148,17 @@ def _dots_by_subset(axis, rows: pd.DataFrame, names: list[str]) -> None:
     names : list of str
         The detectors, the first on top.
     """
-    subsets = [name for name in _SUBSETS if name in set(rows["subset"])]
+    looks = {name: look for name, look in STYLES["subset_marks"].items() if name in set(rows["subset"])}
+    subsets = list(looks)
     places = rows["subset"].map(subsets.index).map(lambda k: marks.offset(k, len(subsets), 0.22))
     for detector, of in rows.assign(y=places).dropna(subset="value").groupby("detector", sort=False):
         of, colour = of.assign(y=of["y"] + names.index(detector)), detector_colour(detector.partition(",")[0])
         pair = of[of["subset"].isin(["basic", "headless"])]
         axis.plot(pair["value"], pair["y"], "-", lw=3, alpha=0.45, color=colour)
         for subset, one in of.groupby("subset"):
-            marker, face = _SUBSETS[subset]
-            marks.dots(axis, one, one["y"], fmt=marker, color=colour, mfc=face, ms=6, capsize=0)
+            marks.dots(axis, one, one["y"], **looks[subset], fmt="", ls="", color=colour, ms=6, capsize=0)
     marks.name_rows(axis, [name.replace(", ", ",\n") for name in names])
-    keys = {name: {"marker": marker, "mfc": face, "ls": ""} for name, (marker, face) in _SUBSETS.items()}
-    marks.add_keys(axis, (), {name.capitalize(): keys[name] for name in subsets})
+    marks.add_keys(axis, (), {name.capitalize(): look | {"ls": ""} for name, look in looks.items()})
 
 
 @in_style
@@ -208,7 +198,7 @@ def time_per_image(table: pd.DataFrame, machine_note: str) -> Figure:
 @in_style
 def precisions(table: pd.DataFrame, note: str) -> Figure:
     """AP of bodies in a run and on photographs; `table` as from `hicp_lib.study.photographs.beside`."""
-    figure, _, panels = marks.dot_chart(table, "detector", "where", _PENS, WIDTH_IN, ["subset"])
+    figure, _, panels = marks.dot_chart(table, "detector", "where", STYLES["places"], WIDTH_IN, ["subset"])
     for axis, _, subset in panels:
         axis.set(xlabel="average precision", xlim=(0, 1))
         axis.set_title(subset.capitalize(), fontsize=9)

@@ -12,14 +12,13 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
 from hicp_lib.datasets.visibility import CLASSES, MIN_PEOPLE
 from hicp_lib.evaluation.cases import Found, Truth
-from hicp_lib.evaluation.failures.error_kinds import HITS, KINDS
-from hicp_lib.evaluation.failures.placed_keypoints import STATES
+from hicp_lib.evaluation.failures.error_kinds import HITS
 from hicp_lib.evaluation.failures.without_head import HEAD_POINTS
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.inspection.skeletons import draw_rings
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.evaluation import GROUP_TITLES
-from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.palette import STYLES, detector_colour
 from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
 from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_lines, in_style, texts
 
@@ -27,10 +26,6 @@ _TRUTH_COLOUR = "#39D353"
 _ONE_CROP = ["subset", "image_id", "annotation_id"]
 _TITLES = ("detector", "case", "mistakes")  # what stands over a picture, but for what names its row
 _BLIND = 0.05  # a class in which no detector has a higher AP is one that all are blind to
-_KIND_COLOURS = ("#0072B2", "#8FC6E8", "#F0E442", "#CC79A7", "#D55E00", "#BDBDBD", "#5F5F5F")
-_EDGE = {"edgecolor": "white", "lw": 0.4}
-_KIND_STYLES = {kind: _EDGE | {"color": c} for kind, c in zip(KINDS, _KIND_COLOURS, strict=True)}
-_STATE_STYLES = dict(zip(STATES[:3], (("-", "o"), ("--", "s"), (":", "^")), strict=True))
 
 
 def class_examples(classes: pd.DataFrame, truth: Truth, folders: Mapping[str, Path], note: str) -> Figure:
@@ -105,7 +100,7 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
     figure, axes, panels = marks.panels(rows, ["detector", "group"], WIDTH_IN, height_in, sharex=True)
     for axis, of_detector, detector, _ in panels:
         part = of_detector.pivot(index=by, columns="kind", values="share").reindex(order)
-        marks.stacked_bars(axis, part, _KIND_STYLES)
+        marks.stacked_bars(axis, part, STYLES["error_kinds"])
         _say_too_few(axis, order, set(part.index[part.isna().all(axis=1)]))
         axis.set(xlim=(0, 1), title=in_lines(detector))
         marks.name_rows(axis, order)
@@ -186,9 +181,9 @@ def scores_by_state(table: pd.DataFrame, note: str) -> Figure:
     rows = rows[rows["n"] >= MIN_PEOPLE]
     figure, (axes,), panels = marks.panels(rows, ["detector"], WIDTH_IN, 2.9, sharey=True)
     for axis, of_detector, detector in panels:
-        for state, (line, marker) in _STATE_STYLES.items():
+        for state, style in STYLES["states"].items():
             part = of_detector[of_detector["state"] == state]
-            pen = {"ls": line, "marker": marker, "ms": 4, "capsize": 2, "color": detector_colour(detector)}
+            pen = style | {"ms": 4, "capsize": 2, "color": detector_colour(detector)}
             axis.errorbar(part["score"], part["value"], marks.whiskers(part), label=state, **pen)
         axis.plot([0, 1], [0, 1], "--", color="#AAAAAA", lw=1)
         axis.set(xlim=(0, 1.02), ylim=(-0.02, 1.02), xlabel="score")

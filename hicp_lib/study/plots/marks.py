@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hicp_lib.study.plots.palette import SUBSET_COLOURS, SUBSET_MARKERS, detector_colour, detector_marker
+from hicp_lib.study.plots.palette import STYLES, detector_colour, detector_marker
 from hicp_lib.study.plots.style import in_lines, new_figure
 
 _BOUNDS = ("value", "low", "high")
@@ -162,10 +162,7 @@ def detector_dots(detectors: Iterable[str]) -> dict[str, dict[str, Any]]:
 
 def subset_dots(subsets: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Colour, marker and label of each subset's `dots`."""
-    pens = {
-        name: {"color": SUBSET_COLOURS.get(name), "fmt": SUBSET_MARKERS.get(name, "o")} for name in subsets
-    }
-    return {name: pen | {"label": name} for name, pen in pens.items()}
+    return {name: STYLES["subsets"].get(name, {}) | {"label": name} for name in subsets}
 
 
 def own_bodies(table: pd.DataFrame) -> pd.DataFrame:

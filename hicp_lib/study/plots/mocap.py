@@ -12,7 +12,7 @@ from hicp_lib.evaluation.space.error_budget import AGAINST_MOCAP, TOTALS
 from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS
 from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import PERFECT, TRUTH_COLOUR, detector_colour, detector_marker
+from hicp_lib.study.plots.palette import PERFECT, STYLES, TRUTH_COLOUR, detector_colour, detector_marker
 from hicp_lib.study.plots.style import COLUMN_IN, TEXTS, Figure, in_style, new_figure, texts
 from hicp_lib.study.table_format import in_cm
 
@@ -112,7 +112,6 @@ def residuals(
     return Figure(figure, *texts("residuals", **told, said=said), errors[columns])
 
 
-_PENS = {"paper": {"color": "#D55E00", "fmt": "s"}, "robust": {"color": "#0072B2", "fmt": "o"}}
 _TOTALS_APART = 0.5  # rows
 
 
@@ -141,7 +140,7 @@ def error_budget(budget: pd.DataFrame, view: str, paper: pd.DataFrame, note: str
             y = of["source"].map(rows) + marks.offset(methods.index(method), len(methods), 0.3)
             is_gain, bounds = kind == "gain", ("value_m", "low_m", "high_m")
             label = f"{method} lifting, {'gained without' if is_gain else 'alone'}"
-            pen = _PENS[method] | {"label": label} | ({"mfc": "white"} if is_gain else {})
+            pen = STYLES["liftings"][method] | {"label": label} | ({"mfc": "white"} if is_gain else {})
             marks.dots(axis, of, y, bounds, 100, **pen)
         if AGAINST_MOCAP in rows:
             theirs_cm = 100 * paper.loc[paper["keypoint"].str.endswith(part), "median_m"]
