@@ -35,7 +35,6 @@ from hicp_lib.detectors.registry import COMBINED, DETECTORS
 from hicp_lib.report import repetition
 
 NOT_RUN = "not run"
-_MOST_SHOWN = 20  # outputs that differ from the reference run's
 
 
 @dataclass(frozen=True)
@@ -83,8 +82,7 @@ class Results:
         path = self.folder / notebook / f"{name}.parquet"
         if not path.is_file():
             raise InputError(f"{path}: a page of the book needs this table; save it in the notebook")
-        table = pd.read_parquet(path).astype(object)
-        return table.where(table.notna(), None).to_dict("records")
+        return _records(pd.read_parquet(path))
 
     def figure(self, notebook: str, name: str) -> Markup:
         """A saved figure as HTML, with a link to the notebook that made it."""
@@ -106,9 +104,9 @@ class Results:
         Returns
         -------
         dict or None
-            The stamp of the reference run's last notebook (`stamp`), tables in Markdown of how many outputs
-            agree (`counts`) and of those outside tolerance (`outside`, the first ones), how many there are
-            in all (`n`) and outside (`n_outside`), and why notebooks are not compared (`left_out`).
+            The stamp of the reference run's last notebook (`stamp`), rows of how many outputs of a notebook
+            agree (`counts`) and of those outside tolerance (`outside`), and why notebooks are not compared
+            (`left_out`).
         """
         reference = REFERENCE_DIR / self.profile
         stamps = sorted(reference.glob("*/provenance.json"))
@@ -119,14 +117,8 @@ class Results:
         counts = counts.reindex(columns=repetition.VERDICTS, fill_value=0)
         counts.insert(0, "outputs", counts.sum(axis=1))
         outside = rows[rows["verdict"] == "outside"].drop(columns="verdict")
-        return {
-            "stamp": read_json(stamps[-1]),
-            "counts": markdown_table(counts.reset_index()),
-            "outside": markdown_table(outside.head(_MOST_SHOWN), digits=4),
-            "n": len(rows),
-            "n_outside": len(outside),
-            "left_out": left_out,
-        }
+        told = {"counts": _records(counts.reset_index()), "outside": _records(outside)}
+        return told | {"stamp": read_json(stamps[-1]), "left_out": left_out}
 
     def _entry(self, notebook: str, file: str, name: str) -> Any:
         path = self.folder / notebook / file
@@ -179,25 +171,9 @@ def not_told_apart(best: dict[str, Any], others: list[dict[str, Any]]) -> list[s
     ]
 
 
-def markdown_table(table: pd.DataFrame, digits: int = 2) -> Markup:
-    """A table in Markdown, numbers rounded to `digits` decimals; what is missing is a dash.
-
-    Examples
-    --------
-    >>> print(markdown_table(pd.DataFrame({"detector": ["a|b"], "AP": [0.714]})))
-    | detector | AP |
-    |---|---|
-    | a&#124;b | 0.71 |
-    """
-
-    def cell(value: Any) -> str:
-        if value is None or value is pd.NA or value != value:
-            return "–"
-        return f"{value:.{digits}f}" if isinstance(value, float) else escaped(value)
-
-    rows = [list(table.columns), *table.itertuples(index=False)]
-    lines = ["| " + " | ".join(cell(value) for value in row) + " |" for row in rows]
-    return Markup("\n".join([lines[0], "|" + "---|" * len(table.columns), *lines[1:]]))
+def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """The rows of a table by column; what is missing is None."""
+    return table.astype(object).where(table.notna(), None).to_dict("records")
 
 
 def render_page(source: Path, results: Results, profile: str) -> str:

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.report.prose import Results, markdown_table, render_page
+from hicp_lib.report.prose import Results, render_page
 
 
 @pytest.fixture
@@ -70,9 +70,3 @@ def test_what_is_not_there_stops_the_build(tmp_path, results, text, expected):
         rendered(tmp_path, results, text)
     assert expected in str(error.value)
     assert "\n" not in str(error.value)
-
-
-def test_numbers_are_rounded_and_gaps_are_dashes():
-    table = pd.DataFrame({"x_px": [1.234, np.nan], "n": [3, 4], "s": ["a", None]})
-    lines = markdown_table(table.assign(s=["a|b", None])).splitlines()
-    assert lines[2:] == ["| 1.23 | 3 | a&#124;b |", "| – | 4 | – |"]
