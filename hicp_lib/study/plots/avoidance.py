@@ -100,7 +100,7 @@ def sweep_curves(sweeps: Mapping[str, pd.DataFrame], note: str) -> Figure:
         axis.set_xlabel(label)
     for axis in axes[:, 0]:
         axis.set(ylabel="least distance (cm)", ylim=(0, None))
-    marks.legend_below(figure, axes, ncols=2)
+    marks.legend_below(figure, axes)
     lines = table.assign(cm=100 * table["value"]).groupby(["swept", *case], sort=False)["cm"]
     ends = lines.agg(["first", "last"]).reset_index()
     ends = ends.assign(swept=[labels[of][0].rpartition(" (")[0] for of in ends["swept"]])

@@ -208,7 +208,7 @@ def layouts() -> Figure:
         rows.append((name.replace("\n", " "), len(given), int((given >= 0).sum())))
         _draw_layout(axis, points_m, given, f"{name}, {len(given)}")
     _draw_layout(axes.flat[-1], points_m, LEFT_HAND, "a left hand, the same\nof all that give it")
-    marks.legend_below(figure, axes.flat[3], ncols=2)
+    marks.legend_below(figure, axes.flat[3])
     table = pd.DataFrame(rows, columns=["layout", "points", "drawn"])
     return Figure(figure, *texts("layouts", said=table), table)
 

@@ -105,7 +105,7 @@ def dose_curves(table: pd.DataFrame, group: str, measure: str = "AP") -> Figure:
             axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
     figure.supylabel(_MEASURES[measure], fontsize=10)
-    marks.legend_below(figure, axes[0, 0], ncols=2)
+    marks.legend_below(figure, axes[0, 0])
     known = rows.dropna(subset="value")
     lowest = known.loc[known.groupby("detector", sort=False)["value"].idxmin()]
     told = {"measure": _MEASURES[measure], "group": _GROUPS[group], "said": lowest}

@@ -43,7 +43,7 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
     for threshold, (*_, fill) in _THRESHOLDS.items():
         pens[f"OKS {threshold}"] = {"marker": "o", "ls": "", "fillstyle": fill}
     marks.add_keys(axes[0, 0], (), pens)
-    marks.legend_below(figure, axes[0, 0], ncols=_legend_columns(pens))
+    marks.legend_below(figure, axes[0, 0])
     said = _extreme(table[table["metric"] == "AP"], "idxmax")
     return Figure(figure, *texts("precision_recall", note=data_note, said=said), table)
 
@@ -69,11 +69,6 @@ def _pen(detector: str) -> dict[str, Any]:
 
 def _short_title(group: str) -> str:
     return GROUP_TITLES.get(group, group).partition(" (")[0].lower()
-
-
-def _legend_columns(names) -> int:
-    """How many columns of these names a figure is wide enough for."""
-    return 2 if max(map(len, names)) < 30 else 1
 
 
 def _extreme(rows: pd.DataFrame, which: str) -> pd.DataFrame:
@@ -133,7 +128,7 @@ def _by_subset(rows: pd.DataFrame, labels: dict[str, str], across: str, xlim=(-0
         axis.label_outer()
     for axis, group in zip(axes[:, 0], groups, strict=True):
         axis.set_title(GROUP_TITLES.get(group, group))
-    marks.legend_below(figure, axes, ncols=4)
+    marks.legend_below(figure, axes)
     return figure
 
 
@@ -176,7 +171,7 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
             apart = 0.05 + 0.2 * names.index(detector) / len(names), 0.2  # of the panel's diagonal
             axis.step(*steps, where="pre", label=detector, markevery=apart, **_pen(detector))
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
-    marks.legend_below(figure, axes, ncols=_legend_columns(names))
+    marks.legend_below(figure, axes)
     medians = table.groupby(["subset", "group", "detector"], sort=False)["oks"].median().rename("value")
     said = _extreme(medians.reset_index(), "idxmin")
     return Figure(figure, *texts("oks_curves", note=data_note, said=said), table)

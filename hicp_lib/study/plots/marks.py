@@ -14,23 +14,22 @@ _BOUNDS = ("value", "low", "high")
 _NO_DETECTOR = "#444444"  # what stands in a legend for all detectors
 
 
-def legend_below(figure, axes, ncols: int = 4, fontsize: float = 9) -> None:
-    """A legend under a figure, with each label of its axes once.
+def legend_below(figure, axes) -> None:
+    """A legend under a figure, with each label of its axes once, in as many columns as there is room for.
 
     Parameters
     ----------
     figure : matplotlib.figure.Figure
     axes : matplotlib.axes.Axes or array of matplotlib.axes.Axes
-    ncols : int
-        Columns of the legend.
-    fontsize : float
-        In points.
     """
     found = {}
     for axis in np.ravel(axes):
         pairs = zip(*axis.get_legend_handles_labels(), strict=True)
         found.update({in_lines(label): handle for handle, label in pairs})
-    figure.legend(found.values(), found, loc="outside lower center", ncols=ncols, fontsize=fontsize)
+    longest = max((len(line) for label in found for line in label.split("\n")), default=0)
+    fitting = int(figure.get_figwidth() / (0.6 + 0.075 * longest))  # inches of a column, at 9 points
+    ncols = min(max(fitting, 1), 4)
+    figure.legend(found.values(), found, loc="outside lower center", ncols=ncols, fontsize=9)
 
 
 def add_keys(axis, detectors: Iterable[str], others: Mapping[str, dict[str, Any]]) -> None:
@@ -246,7 +245,7 @@ def dot_chart(
     for axis, part, *_ in found:
         dots_in_rows(axis, part, down, beside, names, pens, **shared)
     name_rows(axes[0, 0], names)
-    legend_below(figure, axes, ncols=2)
+    legend_below(figure, axes)
     return figure, axes, found
 
 

@@ -103,7 +103,7 @@ def residuals(
         axis.axhline(0, color=TRUTH_COLOUR, lw=1)
         axis.set(ylabel=label, ylim=(-104 * _MOST_M, 104 * _MOST_M))
     axes[-1].set(xlabel="time [s]")
-    marks.legend_below(figure, axes, ncols=2)
+    marks.legend_below(figure, axes)
     said = found.groupby("detector", sort=False)["error_m"].agg(["size", "median"]).reset_index()
     said["median"] *= 100
     told = {"min_score": min_score, "beyond_cm": 100 * _MOST_M, "floor": _floor(errors), "note": note}
@@ -149,7 +149,7 @@ def error_budget(budget: pd.DataFrame, view: str, paper: pd.DataFrame, note: str
         axis.set(title=f"{part}s", xlabel="error, or gain [cm]")
         axis.axvline(0, color="#888888", lw=0.8)
     axes[0, 0].set(yticks=[*rows.values()], yticklabels=[*rows], ylim=(max(rows.values()) + 0.6, -0.6))
-    marks.legend_below(figure, axes, ncols=2)
+    marks.legend_below(figure, axes)
     beside = ", against motion capture beside the paper's best medians" if AGAINST_MOCAP in rows else ""
     first = table[table["kind"] == "alone"].sort_values("value_m", ascending=False)
     first = first.drop_duplicates(["part", "method"]).set_index(["part", "method", "source"])["value_m"]
@@ -197,7 +197,7 @@ def registration(
     known = bool(table["added_m"].notna().any())
     column, label = _ADDED if known else _LEAVE_ONE_OUT
     _draw_bars(bars, 1000 * table.set_index("method")[column], label)
-    marks.legend_below(figure, axes[0, 0], ncols=2)
+    marks.legend_below(figure, axes[0, 0])
     what = TEXTS["registration"]["known" if known else "unknown"]
     said = 1000 * table.set_index("method")[column].dropna()
     return Figure(figure, *texts("registration", what=what, note=note, said=said), table)

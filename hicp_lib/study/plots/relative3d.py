@@ -94,7 +94,7 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
             axis.set(aspect="equal", xlim=limits[across], ylim=limits[up])
             axis.set(title=direction, xlabel=f"{across[0]} [m]", ylabel=f"{view}, {up[0]} [m]")
             axis.yaxis.set_inverted(up == "x_m")  # forward is up
-    marks.legend_below(figure, axes, ncols=2)
+    marks.legend_below(figure, axes)
     counts = medians.groupby(["detector", "view"], sort=False).size()
     told = {"fewest": fewest, "dashed": "; dashed: the true skeleton" * bool(truth), "note": note, "off": ""}
     if truth:
@@ -147,7 +147,7 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
             scale.set_minor_locator(NullLocator())
         axis.axline((1, 1), (2, 2), color="#888888", lw=1, ls="--")
         axis.label_outer()
-    marks.legend_below(figure, axes, ncols=2)
+    marks.legend_below(figure, axes)
     n_bias, n = (rows["bias_m"] > rows["spread_m"]).sum(), len(rows)
     told = {"method": method, "filled": views[0], "intervals": intervals_over(rows), "note": note}
     biases_cm = 100 * rows.groupby("detector", sort=False)["bias_m"].median()

@@ -47,7 +47,7 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
     keys = {name: {"color": detector_colour(name), "marker": detector_marker(name)} for name in detectors}
     lines = {f"{name} lifting": {"ls": _METHOD_LINES.get(name, "--")} for name in methods}
     marks.add_keys(axes[0, 0], (), keys | lines)
-    marks.legend_below(figure, axes[0, 0], ncols=3)
+    marks.legend_below(figure, axes[0, 0])
     middle_m = marked_m[len(marked_m) // 2]
     rows = table[np.isclose(table["threshold_m"], middle_m)]
     means = rows.groupby(["detector", "view", "method"], sort=False)["value"].mean()
