@@ -120,7 +120,7 @@ def _by_subset(rows: pd.DataFrame, labels: dict[str, str], across: str, xlim=(-0
     names = {group: list(rows.loc[rows["group"] == group, "detector"].unique()) for group in groups}
     heights = [len(of_group) + 0.8 for of_group in names.values()]
     height_in = 0.5 * sum(heights) + 0.9
-    shared: dict[str, Any] = {"height_ratios": heights, "sharex": "col", "sharey": "row"}
+    shared: dict[str, Any] = {"height_ratios": heights, "sharex": True, "sharey": "row"}
     figure, axes, panels = marks.panels(rows, ["group", across], WIDTH_IN, height_in, **shared)
     for axis, part, group, what in panels:
         _dots_by_subset(axis, part, names[group])
