@@ -17,7 +17,6 @@ from hicp_lib.study.plots.style import TEXTS, WIDTH_IN, Figure, in_style, texts
 
 _LOGARITHMIC = ("light", "resolution", "distance")
 _GROUPS = {"body": "Bodies", "hand": "Hands"}
-_MEASURES = {"AP": "average precision", "visible keypoints hit": "share of visible keypoints hit"}
 
 
 def level_text(dose: str, level: float) -> str:
@@ -74,17 +73,20 @@ def dose_pictures(
 
 
 @in_style
-def dose_curves(table: pd.DataFrame, group: str, measure: str = "AP") -> Figure:
+def dose_curves(table: pd.DataFrame, group: str, measure: str = "AP", note: str = "") -> Figure:
     """AP, or another measure, against each dose.
 
     Parameters
     ----------
     table : pd.DataFrame
-        As from `hicp_lib.evaluation.failures.dose_curves.dose_curves`.
+        As from `hicp_lib.evaluation.failures.dose_curves.dose_curves`, or from
+        `hicp_lib.study.observed.observed_curves`.
     group : {"body", "hand"}
         Of keypoints.
     measure : str, optional
-        One of `hicp_lib.evaluation.failures.dose_curves.MEASURES`.
+        Of those in the table.
+    note : str, optional
+        What the data are, for the caption of what was observed and not varied.
     """
     table = table[table["group"] == group]
     rows = table[table["measure"] == measure].astype({"low": float, "high": float})
@@ -104,12 +106,13 @@ def dose_curves(table: pd.DataFrame, group: str, measure: str = "AP") -> Figure:
             axis.set_xscale("log")
             axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
-    figure.supylabel(_MEASURES[measure], fontsize=10)
+    label = "average precision" if measure == "AP" else f"share of {measure}"
+    figure.supylabel(label, fontsize=10)
     marks.legend_below(figure, axes[0, 0])
     known = rows.dropna(subset="value")
     lowest = known.loc[known.groupby("detector", sort=False)["value"].idxmin()]
-    told = {"measure": _MEASURES[measure], "group": _GROUPS[group], "said": lowest}
-    return Figure(figure, *texts("dose_curves", **told), table)
+    told = {"measure": label, "group": _GROUPS[group], "said": lowest, "note": note}
+    return Figure(figure, *texts("observed_curves" if note else "dose_curves", **told), table)
 
 
 @in_style
