@@ -47,7 +47,7 @@ def surveyed_detectors(run: Collection[str]) -> pd.DataFrame:
         for name in dict.fromkeys([*PAPER_SYSTEMS, *DETECTORS])
     ]
     table = pd.DataFrame(rows)
-    counts = table[["n_parameters", "n_operations"]].astype(float) / (1e6, 1e9)
+    counts = table[["n_parameters", "n_operations"]].astype(float) / [1e6, 1e9]
     titles = {
         "training_data": "training data",
         "n_parameters": "parameters [M]",

@@ -58,11 +58,8 @@ def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, min_term: flo
         colour = detector_colour(of_case["detector"].iloc[0])
         _draw_curves(axis, of_case[of_case["count"] >= _FEWEST], colour)
         axis.set_title(case, fontsize=8)
-        axis.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
-    for axis in axes[:, 0]:
-        axis.set(ylabel="share of hits")
-    for axis in axes[-1]:
-        axis.set(xlabel="score")
+        axis.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), xlabel="score", ylabel="share of hits")
+        axis.label_outer()
     marks.legend_below(figure, axes[0, 0])
     told = {"min_term": min_term, "fewest": _FEWEST, "said": errors.replace({"group": _GROUPS})}
     return Figure(figure, *texts("reliability_curves", note=note, **told), curves)
