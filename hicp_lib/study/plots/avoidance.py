@@ -154,18 +154,18 @@ def nearest_views(runs: Sequence[Run], note: str) -> Figure:
     note : str
         What the data are, for the caption.
     """
-    shown: dict[str, dict[str, np.ndarray]] = {}
-    n_found: dict[str, int] = {}
+    shown: dict[str, dict[str, tuple[Run, pd.Series]]] = {}
     for run in runs:
         past = run.frames[run.frames["t_s"] <= (NEAR_S + LEAVES_S[0]) / 2] if len(run.frames) else run.frames
         if len(past):
-            name, frame = run.job.condition, past.iloc[-1]
-            shown.setdefault(run.job.trial.script, {})[name] = _drawn(run, frame)
-            n_found[name] = n_found.get(name, 0) + bool(image(frame)[1].scores.max(initial=0) >= SURE)
-    rows = [[pictures.get(name) for name in n_found] for pictures in shown.values()]
-    told = {"scripts": list(shown), "seen": pd.Series(n_found), "min_score": SURE, "note": note}
-    grid = rows, *texts("nearest_views", **told), list(shown), list(n_found)
-    return picture_grid(*grid, cell_in=COLUMN_IN / max(len(n_found), 2))
+            shown.setdefault(run.job.trial.script, {})[run.job.condition] = run, past.iloc[-1]
+    seen: dict[str, int] = {}
+    for name, (_, frame) in (one for of_script in shown.values() for one in of_script.items()):
+        seen[name] = seen.get(name, 0) + bool(image(frame)[1].scores.max(initial=0) >= SURE)
+    rows = [[_drawn(*of[name]) if name in of else None for name in seen] for of in shown.values()]
+    told = {"scripts": list(shown), "seen": pd.Series(seen), "min_score": SURE, "note": note}
+    grid = rows, *texts("nearest_views", **told), list(shown), list(seen)
+    return picture_grid(*grid, cell_in=COLUMN_IN / max(len(seen), 2))
 
 
 def _draw_moment(camera, space, run: Run, time_s: float) -> None:

@@ -80,3 +80,8 @@ def test_each_detector_shows_the_last_image_before_the_middle_of_the_near_phase(
     assert axes[0, 0].images[0].get_array().max() == 90 and axes[1, 0].get_ylabel() == "sitting, head"
     assert "sitting, hand and sitting, head" in figure.alt
     assert "somebody is found: mediapipe 0 and movenet-thunder 0." in figure.caption
+    sure = {"keypoints_px": [120.0, 90.0] * 136, "scores": [0.9] * 136, "keypoints_m": [1.0] * 408}
+    there = [Run(run.job, run.cycles, pd.DataFrame([frames.iloc[0].to_dict() | sure]))] * 2
+    assert "somebody is found: mediapipe 1." in nearest_views(there, "made up").caption, (
+        "the last run is shown"
+    )
