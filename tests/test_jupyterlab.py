@@ -120,10 +120,10 @@ def stage_notebooks(folder: Path) -> None:
     """Copies of the notebooks with the quick profile's parameters, put in as a report does."""
     folder.mkdir()
     notebooks = read_notebooks(CHECKOUT / "notebooks")
-    profile = read_profile(CHECKOUT / "notebooks" / "profiles.toml", "quick", notebooks)
+    chosen, _ = read_profile(CHECKOUT / "notebooks" / "profiles.toml", "quick", notebooks)
     shutil.copy(CHECKOUT / "notebooks" / "profiles.toml", folder)
     for notebook in notebooks:
-        parameters = profile.parameters.get(notebook.name, {})
+        parameters = chosen.get(notebook.name, {})
         staged = parameterize_notebook(load_notebook_node(str(notebook.path)), parameters)
         del staged.metadata["papermill"]
         nbformat.write(staged, folder / notebook.path.name)

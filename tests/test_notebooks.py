@@ -129,7 +129,7 @@ def test_every_parameter_says_its_unit_or_values_and_what_to_try(path):
 @pytest.mark.parametrize("profile", ["quick", "full", "deep"])
 def test_profiles_name_what_there_is(profile):
     notebooks = CHECKOUT / "notebooks"
-    assert read_profile(notebooks / "profiles.toml", profile, read_notebooks(notebooks)).after
+    assert read_profile(notebooks / "profiles.toml", profile, read_notebooks(notebooks))[1]
 
 
 def test_every_line_of_a_profile_says_what_it_asks_for():
@@ -140,7 +140,7 @@ def test_every_line_of_a_profile_says_what_it_asks_for():
 @pytest.mark.parametrize("name", ["quick", "full"])
 def test_the_error_budget_looks_at_what_other_pages_have_rendered(name):
     notebooks = read_notebooks(CHECKOUT / "notebooks")
-    changed = read_profile(CHECKOUT / "notebooks" / "profiles.toml", name, notebooks).parameters
+    changed, _ = read_profile(CHECKOUT / "notebooks" / "profiles.toml", name, notebooks)
     values = {one.name: one.defaults | changed.get(one.name, {}) for one in notebooks}
     budget = values["04b_error_budget"]
     for page, frames in (("03_relative_3d", "n_images"), ("04_mocap_3d", "n_frames")):
@@ -195,12 +195,12 @@ def test_the_value_to_try_changes_one_figure(path, notebook, book, tmp_path, mon
     monkeypatch.setenv(RESULTS_VARIABLE, str(tmp_path))
     monkeypatch.setenv(EARLIER_RESULTS_VARIABLE, str(CHECKOUT / "results" / "quick"))
     monkeypatch.chdir(path.parent)
-    profile = read_profile(path.with_name("profiles.toml"), "quick", read_notebooks(path.parent))
+    chosen, _ = read_profile(path.with_name("profiles.toml"), "quick", read_notebooks(path.parent))
     parameters, opening, *rest = code_cells(notebook)
     figure = next(cell for cell in rest if TRY_IT in cell.metadata.get("tags", []))
     kernel: dict = {}
     exec(parameters.source, kernel)
-    kernel |= profile.parameters.get(path.stem, {})
+    kernel |= chosen.get(path.stem, {})
     for cell in (opening, *rest[: rest.index(figure) + 1]):
         exec(cell.source, kernel)
     before = pictures(tmp_path / path.stem)

@@ -41,6 +41,17 @@ def test_invented_heads():
     assert f"on a small network for {shares['openpose-mobilenet']} %." in README
 
 
+def test_people_seen_from_near():
+    values = read_json(FULL / "02_evaluation_2d" / "values.json")
+    who = values["near_note"].replace("rendered people from near", "people seen from near")
+    found, ap = (
+        [values[f"{what}_near_body_{name}"] for name in ("movenet-thunder", "mediapipe")]
+        for what in ("found", "ap")
+    )
+    shares = f"MoveNet Thunder finds {found[0]:.0%} and MediaPipe {found[1]:.0%}".replace("%", " %")
+    assert f"Of {who}, {shares}, with average precision {ap[0]:.2f} and {ap[1]:.2f}." in README
+
+
 def test_distances_in_space():
     floor_cm = read_json(FULL / "04_mocap_3d" / "values.json")["floor_cm"]
     theirs = {joint: medians_cm("paper", joint) for joint in ("wrist", "elbow")}

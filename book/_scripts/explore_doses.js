@@ -4,9 +4,8 @@ hicpExplorers.doses = (place, data, folder) => {
   const picture = hicpMake("div", {class: "hicp-picture"}), words = hicpMake("p", {"aria-live": "polite"});
   let [dose, at, person, minScore] = [data.doses[0], 0, 0, 0.3];
 
-  const told = k => `${dose.levels[k]}${dose.unit}`;
   const draw = () => {
-    const view = dose.views[at][person], level = `${dose.name} ${told(at)}`;
+    const view = dose.views[at][person], level = `${dose.name} ${dose.levels[at]}`;
     const alt = `Person ${person + 1} at ${level}, with what is detected`;
     picture.replaceChildren(
       hicpPicture(`${folder}/${view.file}`, view.size, alt, hicpLayers(view, data, legend, minScore)));
@@ -21,7 +20,7 @@ hicpExplorers.doses = (place, data, folder) => {
   const levels = hicpMake("div", {class: "hicp-through"});
   const choose = () => {
     at = 0;
-    const slider = hicpSlider("Level", dose.levels.length - 1, 0, told, k => {
+    const slider = hicpSlider("Level", dose.levels.length - 1, 0, k => dose.levels[k], k => {
       at = k;
       draw();
     });

@@ -41,9 +41,13 @@ hicpExplorers.films = (place, data, folder) => {
   const keys = Object.keys(data.films[0]).filter(key => !["file", "sheet"].includes(key));
   const chosen = {...data.films[0]}, words = hicpMake("p", {"aria-live": "off"});
   const camera = hicpMake("div"), space = hicpMake("div");
-  let [film, at, turn_deg, timer] = [null, 0, 30, null];
+  let [film, at, turn_deg, timer] = [null, null, 30, null];
 
   const frameAt = t_s => film.frames.findLastIndex(frame => frame.t_s <= t_s + 1e-6);
+  const firstShown = () => {  // the moment of the first picture with somebody in it, or of the first at all
+    const frame = film.frames.find(({found}) => found.length) ?? film.frames[0];
+    return Math.max(0, film.steps.findIndex(({t_s}) => t_s >= frame?.t_s));
+  };
   const draw = () => {
     const step = film.steps[at], k = frameAt(step.t_s), frame = film.frames[k];
     const style = data.detectors.find(({name}) => name === chosen.detector);
@@ -97,7 +101,7 @@ hicpExplorers.films = (place, data, folder) => {
     [film.centre, film.half] = hicpAim(film);
     const {colour} = data.detectors.find(({name}) => name === chosen.detector);
     if (data.bodies.includes("perceived")) legend.paint("perceived", colour);
-    at = Math.min(at, film.steps.length - 1);
+    at = Math.min(at ?? firstShown(), film.steps.length - 1);
     time.input.max = film.steps.length - 1;
     draw();
   };

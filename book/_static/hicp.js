@@ -41,7 +41,7 @@ document.addEventListener("DOMContentLoaded", () => {
     const caption = target.querySelector("caption");
     const isWider = target.scrollWidth > target.clientWidth;
     target.classList.toggle("hicp-wider", isWider);
-    const names = { tabindex: 0 };
+    const names = target.href ? {} : { tabindex: 0 };  // a link has its turn anyway
     if (caption) {
       names.role = "region";
       names["aria-label"] = `Table ${tables.indexOf(target) + 1}, scrolls: ${caption.textContent}`;
@@ -51,5 +51,5 @@ document.addEventListener("DOMContentLoaded", () => {
       else target.removeAttribute(name);
     });
   }));
-  [...tables, ...document.querySelectorAll("pre, .hicp-formula")].forEach((part) => measure.observe(part));
+  [...tables, ...document.querySelectorAll("pre, .hicp-formula, .hicp-chart")].forEach((part) => measure.observe(part));
 });

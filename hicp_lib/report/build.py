@@ -81,14 +81,14 @@ def _plan(profile: str, pairs: list[tuple[str, str]], folder: Path, only: str | 
     notebooks = read_notebooks(folder)
     if only is not None:
         refuse_unknown("--only: notebook", only, [notebook.name for notebook in notebooks])
-    chosen = read_profile(folder / "profiles.toml", profile, notebooks)
+    chosen, after = read_profile(folder / "profiles.toml", profile, notebooks)
     overrides = parse_overrides(pairs, notebooks)
     runs = []
     for notebook in notebooks:
         name = notebook.name
-        parameters = notebook.defaults | chosen.parameters.get(name, {}) | overrides[name]
+        parameters = notebook.defaults | chosen.get(name, {}) | overrides[name]
         _refuse_unknown_detectors(notebook, parameters)
-        runs.append(Run(notebook, parameters, chosen.after.get(name, [])))
+        runs.append(Run(notebook, parameters, after.get(name, [])))
     return runs
 
 

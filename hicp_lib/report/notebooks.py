@@ -53,22 +53,6 @@ class Notebook:
         return self.path.stem
 
 
-@dataclass(frozen=True)
-class Profile:
-    """The settings of a profile.
-
-    Attributes
-    ----------
-    parameters : dict of str to dict
-        Per notebook, the parameters that differ from the defaults.
-    after : dict of str to list of str
-        Per notebook, those whose results it reads or whose work it shares.
-    """
-
-    parameters: dict[str, dict[str, Any]]
-    after: dict[str, list[str]]
-
-
 def read_notebooks(folder: Path) -> list[Notebook]:
     """Every notebook of a folder, in the order of their names, which is the order they run in.
 
@@ -140,7 +124,9 @@ def _allowed(source: str) -> dict[str, str]:
     return {name: found[1] for name, text in above.items() if (found := re.search(r"\[(.+)\]", text))}
 
 
-def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
+def read_profile(
+    path: Path, name: str, notebooks: list[Notebook]
+) -> tuple[dict[str, dict[str, Any]], dict[str, list[str]]]:
     """Read a profile from the file of profiles and check it against the notebooks.
 
     Parameters
@@ -154,7 +140,10 @@ def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
 
     Returns
     -------
-    Profile
+    parameters : dict of str to dict
+        Per notebook, those that differ from the defaults.
+    after : dict of str to list of str
+        Per notebook, those whose results it reads or whose work it shares.
 
     Raises
     ------
@@ -180,7 +169,7 @@ def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
         ) from None
     given = content[name].items()
     parameters = {key: check_parameters(known[key], its, f"{path}, [{name}.{key}]") for key, its in given}
-    return Profile(parameters, after)
+    return parameters, after
 
 
 def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> dict[str, Any]:

@@ -9,6 +9,10 @@ from bs4 import BeautifulSoup
 from PIL import Image
 
 _ICON = re.compile(r'[{,]"?([a-z][a-z0-9-]*)"?:\[(\d+),(\d+),\[[^\]]*\],"\w+","([^"]+)"\]')
+# Scripts of the theme that need not run before a page is drawn.
+_CAN_WAIT = re.compile(
+    r"doctools|sphinx_highlight|clipboard|copybutton|book-theme\.js|toggle\w+\.js|design-tabs"
+)
 # What writes an icon as a letter of a font.
 _LETTERS = re.compile(r"\.fa-[\w-]+:+before(,\.fa-[\w-]+:+before)*\{content:[^{}]*\}")
 
@@ -33,8 +37,11 @@ def finish_page(page: BeautifulSoup, path: Path, book: Path) -> None:
     unused = "fontawesome" + ("" if path.name == "search.html" else "|searchindex|searchtools|language_data")
     unused += "" if page.find(class_=re.compile("^sd-")) else "|sphinx-design"
     for tag in page.find_all(["script", "link"]):
-        if re.search(unused, str(tag.get("src") or tag.get("href"))):
+        address = str(tag.get("src") or tag.get("href"))
+        if re.search(unused, address) or tag.get("rel") == ["preload"]:
             tag.decompose()
+        elif _CAN_WAIT.search(address):
+            tag["defer"] = ""
     for icon in page.find_all("i", class_=re.compile("^fa-")):
         _draw(icon, book / "_static" / "scripts" / "fontawesome.js")
     for figure in page.find_all("figure", class_="hicp"):
@@ -70,9 +77,11 @@ def _show_file(page: BeautifulSoup, figure: Any, folder: Path) -> None:
         shown["src"] = link["href"]
     if shown is None or shown["src"].startswith("data:"):
         return
-    with Image.open(folder / shown["src"]) as image:
+    file = folder / shown["src"]
+    with Image.open(file) as image:
         shown.attrs |= dict(zip(("width", "height"), image.size, strict=True)) | {"loading": "lazy"}
-    shown.wrap(page.new_tag("a", attrs={"class": "hicp-zoom", "href": shown["src"], "title": "Enlarge"}))
+    kind = "hicp-zoom" + " hicp-chart" * file.with_suffix(".svg").is_file()
+    shown.wrap(page.new_tag("a", attrs={"class": kind, "href": shown["src"], "title": "Enlarge"}))
 
 
 def _name(page: BeautifulSoup, table: Any) -> None:

@@ -2,8 +2,7 @@
 
 In a page of `book/`, between double braces:
 
-    value("02_evaluation_2d", "body_ap", digits=2)    a recorded value; "not run" when it is None
-    table("02_evaluation_2d", "ap", columns=[...])    a saved table in Markdown
+    value("02_evaluation_2d", "data_note")            a recorded value; "not run" when it is None
     rows("02_evaluation_2d", "head_loss_table")       a saved table's rows; what is missing is None
     figure("02_evaluation_2d", "precision_recall")    a saved figure with its caption and alt text
     stamp("02_evaluation_2d")                         what a notebook was made with, its `provenance.json`
@@ -11,6 +10,7 @@ In a page of `book/`, between double braces:
     notebooks                                         names of the notebooks that were run
     data("paper.json")                                a JSON file of `data/`, for loops over its rows
     label("combined:posenet+mediapipe-hands")         a detector's name in plain words
+    not_told_apart(best, others)                      whose share may be as low as the best's
     repetition()                                      this run beside the profile's reference run
 
 A name that no result file has stops the build. Texts are shown as they are, whatever is in them; what is
@@ -18,6 +18,7 @@ Markdown, as texts of `data` may be, says so: `data("paper.json").why | safe`.
 """
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,6 @@ from hicp_lib.detectors.registry import COMBINED, DETECTORS
 from hicp_lib.report import repetition
 
 NOT_RUN = "not run"
-_MOST_SHOWN = 20  # outputs that differ from the reference run's
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,8 @@ class Results:
         """Names of the notebooks that were run."""
         return sorted(path.parent.name for path in self.folder.glob("*/values.json"))
 
-    def value(self, notebook: str, name: str, digits: int | None = None) -> str:
+    def value(self, notebook: str, name: str) -> str:
         """A recorded value as text; "not run" when the notebook recorded None.
-
-        Parameters
-        ----------
-        notebook, name : str
-        digits : int, optional
-            Decimals; the number as it is where left out.
 
         Raises
         ------
@@ -71,37 +65,24 @@ class Results:
             If the notebook recorded no such value.
         """
         value = self.raw(notebook, name)
-        if value is None:
-            return NOT_RUN
-        return f"{value:.{digits}f}" if digits is not None else str(value)
+        return NOT_RUN if value is None else str(value)
 
     def raw(self, notebook: str, name: str) -> Any:
         """A recorded value as it is, for conditions in a template."""
         return self._entry(notebook, "values.json", name)
 
-    def table(self, notebook: str, name: str, columns: list[str] | None = None, digits: int = 2) -> Markup:
-        """A saved table in Markdown; what is missing is a dash.
-
-        Parameters
-        ----------
-        notebook, name : str
-        columns : list of str, optional
-            Those to show, in this order; all where left out.
-        digits : int
-            Decimals of its numbers.
+    def rows(self, notebook: str, name: str) -> list[dict[str, Any]]:
+        """The rows of a saved table, by column; what is missing is None.
 
         Raises
         ------
         InputError
             If the notebook saved no such table.
         """
-        table = self._table(notebook, name)
-        return markdown_table(table[columns] if columns else table, digits)
-
-    def rows(self, notebook: str, name: str) -> list[dict[str, Any]]:
-        """The rows of a saved table, by column; what is missing is None."""
-        table = self._table(notebook, name).astype(object)
-        return table.where(table.notna(), None).to_dict("records")
+        path = self.folder / notebook / f"{name}.parquet"
+        if not path.is_file():
+            raise InputError(f"{path}: a page of the book needs this table; save it in the notebook")
+        return _records(pd.read_parquet(path))
 
     def figure(self, notebook: str, name: str) -> Markup:
         """A saved figure as HTML, with a link to the notebook that made it."""
@@ -123,9 +104,9 @@ class Results:
         Returns
         -------
         dict or None
-            The stamp of the reference run's last notebook (`stamp`), tables in Markdown of how many outputs
-            agree (`counts`) and of those outside tolerance (`outside`, the first ones), how many there are
-            in all (`n`) and outside (`n_outside`), and why notebooks are not compared (`left_out`).
+            The stamp of the reference run's last notebook (`stamp`), rows of how many outputs of a notebook
+            agree (`counts`) and of those outside tolerance (`outside`), and why notebooks are not compared
+            (`left_out`).
         """
         reference = REFERENCE_DIR / self.profile
         stamps = sorted(reference.glob("*/provenance.json"))
@@ -136,20 +117,8 @@ class Results:
         counts = counts.reindex(columns=repetition.VERDICTS, fill_value=0)
         counts.insert(0, "outputs", counts.sum(axis=1))
         outside = rows[rows["verdict"] == "outside"].drop(columns="verdict")
-        return {
-            "stamp": read_json(stamps[-1]),
-            "counts": markdown_table(counts.reset_index()),
-            "outside": markdown_table(outside.head(_MOST_SHOWN), digits=4),
-            "n": len(rows),
-            "n_outside": len(outside),
-            "left_out": left_out,
-        }
-
-    def _table(self, notebook: str, name: str) -> pd.DataFrame:
-        path = self.folder / notebook / f"{name}.parquet"
-        if not path.is_file():
-            raise InputError(f"{path}: a page of the book needs this table; save it in the notebook")
-        return pd.read_parquet(path)
+        told = {"counts": _records(counts.reset_index()), "outside": _records(outside)}
+        return told | {"stamp": read_json(stamps[-1]), "left_out": left_out}
 
     def _entry(self, notebook: str, file: str, name: str) -> Any:
         path = self.folder / notebook / file
@@ -172,25 +141,39 @@ def label(detector: str) -> str:
     return " + ".join(DETECTORS[part].label if part in DETECTORS else part for part in parts)
 
 
-def markdown_table(table: pd.DataFrame, digits: int = 2) -> Markup:
-    """A table in Markdown, numbers rounded to `digits` decimals; what is missing is a dash.
+def not_told_apart(best: dict[str, Any], others: list[dict[str, Any]]) -> list[str]:
+    """Detectors whose share may be as low as the lowest: the 95 % interval of the difference holds 0.
+
+    The interval is made of those of the two shares (Newcombe, Statistics in Medicine 1998, method 10).
+
+    Parameters
+    ----------
+    best : dict of str to object
+        `value, low, high` of the lowest share; None where there is no interval, which tells nobody apart.
+    others : list of dict
+        The same of the others, and `detector`.
+
+    Returns
+    -------
+    list of str
 
     Examples
     --------
-    >>> print(markdown_table(pd.DataFrame({"detector": ["a|b"], "AP": [0.714]})))
-    | detector | AP |
-    |---|---|
-    | a&#124;b | 0.71 |
+    >>> best = {"value": 0.1, "low": 0.05, "high": 0.2}
+    >>> not_told_apart(best, [{"detector": "a", "value": 0.2, "low": 0.1, "high": 0.3}])
+    ['a']
     """
+    return [
+        row["detector"]
+        for row in others
+        if None in (row["low"], best["high"])
+        or row["value"] - best["value"] <= math.hypot(row["value"] - row["low"], best["high"] - best["value"])
+    ]
 
-    def cell(value: Any) -> str:
-        if value is None or value is pd.NA or value != value:
-            return "–"
-        return f"{value:.{digits}f}" if isinstance(value, float) else escaped(value)
 
-    rows = [list(table.columns), *table.itertuples(index=False)]
-    lines = ["| " + " | ".join(cell(value) for value in row) + " |" for row in rows]
-    return Markup("\n".join([lines[0], "|" + "---|" * len(table.columns), *lines[1:]]))
+def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """The rows of a table by column; what is missing is None."""
+    return table.astype(object).where(table.notna(), None).to_dict("records")
 
 
 def render_page(source: Path, results: Results, profile: str) -> str:
@@ -215,10 +198,11 @@ def render_page(source: Path, results: Results, profile: str) -> str:
     """
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.finalize = lambda value: escaped(value) if type(value) is str else value  # except Markup
-    offered = ("value", "raw", "table", "rows", "figure", "stamp", "repetition")
+    offered = ("value", "raw", "rows", "figure", "stamp", "repetition")
     names = {name: getattr(results, name) for name in offered}
     names |= {"data": lambda name: json.loads((DATA_DIR / name).read_text())}
-    names |= {"profile": profile, "notebooks": results.notebooks(), "label": label}
+    names |= {"profile": profile, "notebooks": results.notebooks()}
+    names |= {"label": label, "not_told_apart": not_told_apart}
     try:
         return environment.from_string(source.read_text()).render(names)
     except jinja2.TemplateError as error:

@@ -18,11 +18,11 @@ from hicp_lib.core.images import read_image
 from hicp_lib.core.keypoints import LIMBS
 from hicp_lib.evaluation.cases import Found, Truth
 from hicp_lib.formats.annotations import Annotations
+from hicp_lib.study.plots.doses import level_text
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
 
 Explored = tuple[dict[str, Any], dict[str, bytes]]
 MAX_SIDE_PX = 480
-_UNITS = {"distance": " m", "resolution": " px"}  # of doses
 SAME_PEOPLE = ("basic", "headless")
 """Subsets in which equal image ids are of one person."""
 
@@ -101,7 +101,7 @@ def doses(
             views.append(shown | {"file": f"{image_id}.webp"})
     ap = dict(iter(curves[curves["measure"] == "AP"].groupby(["dose", "level"])))
     told = [
-        {"name": dose, "unit": _UNITS.get(dose, ""), "levels": list(levels), "views": list(levels.values())}
+        {"name": dose, "levels": [level_text(dose, level) for level in levels], "views": [*levels.values()]}
         | {"ap": [_rows(ap[dose, level], "value", "low", "high") for level in levels]}
         for dose, levels in taken.items()
     ]

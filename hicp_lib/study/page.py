@@ -111,7 +111,8 @@ class Study:
             write_bytes(self.folder / f"{name}.svg", _rendered(figure.figure, _SVG_OPTIONS))
             self._save_for_download(name, figure.table)
             downloads += ["svg", "parquet", "csv"]
-        image = f'<img src="{_inline("image/webp", content)}" alt="{escaped(figure.alt)}">'
+        within = f"data:image/webp;base64,{base64.b64encode(content).decode()}"
+        image = f'<img src="{within}" alt="{escaped(figure.alt)}">'
         self._show_figure(name, image, figure.caption, downloads, file=file, alt=figure.alt)
 
     def scene(self, name: str, scene: go.Figure, caption: str, alt: str) -> None:
@@ -259,10 +260,6 @@ def _cell(value: Any) -> Any:
     """Numbers as they are, and all else as text without markup."""
     is_number = pd.api.types.is_scalar(value) and not isinstance(value, str | bytes)
     return value if is_number else escaped(value)
-
-
-def _inline(kind: str, content: bytes) -> str:
-    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
 def _rendered(figure, options: dict[str, Any]) -> bytes:

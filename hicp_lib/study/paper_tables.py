@@ -40,17 +40,20 @@ def surveyed_detectors(run: Collection[str]) -> pd.DataFrame:
     >>> table.at["mediapipe", "here"], table.at["mmpose", "here"]
     ('run', 'run')
     """
-    names = dict.fromkeys([*PAPER_SYSTEMS, *DETECTORS])
-    facts = {name: DETECTORS[name].facts for name in names}
     rows = [
-        (DETECTORS[name].label, name, f.paradigm, f.keypoints, f.training_data, f.tracking, f.input,
-         f.n_parameters, f.n_operations, _status(name, run))
-        for name, f in facts.items()
-    ]  # fmt: skip
-    columns = ["system", "detector", "paradigm", "keypoints", "training data", "tracking", "input"]
-    table = pd.DataFrame(rows, columns=[*columns, "parameters [M]", "operations [G]", "here"])
-    units = {"parameters [M]": 1e6, "operations [G]": 1e9}
-    return table.assign(**{name: table[name].astype(float) / unit for name, unit in units.items()})
+        {"system": DETECTORS[name].label, "detector": name}
+        | vars(DETECTORS[name].facts)
+        | {"here": _status(name, run)}
+        for name in dict.fromkeys([*PAPER_SYSTEMS, *DETECTORS])
+    ]
+    table = pd.DataFrame(rows)
+    counts = table[["n_parameters", "n_operations"]].astype(float) / [1e6, 1e9]
+    titles = {
+        "training_data": "training data",
+        "n_parameters": "parameters [M]",
+        "n_operations": "operations [G]",
+    }
+    return table.assign(**counts).rename(columns=titles)
 
 
 def _status(name: str, run: Collection[str]) -> str:

@@ -34,6 +34,18 @@ def test_a_figure_shows_its_file_and_leads_to_it(book):
     assert page.img.parent["class"] == ["hicp-zoom"]
 
 
+def test_a_chart_is_told_from_a_picture_by_its_drawing(book):
+    (book / "results" / "a.svg").touch()
+    assert finished(book, FIGURE).img.parent["class"] == ["hicp-zoom", "hicp-chart"]
+
+
+def test_scripts_that_can_wait_do(book):
+    names = ("doctools", "documentation_options", "togglebutton", "hicp")
+    page = finished(book, "".join(f'<script src="../_static/{name}.js?v=1"></script>' for name in names))
+    assert [tag.has_attr("defer") for tag in page.find_all("script")] == [True, False, True, False]
+    assert finished(book, '<link as="script" href="a.js" rel="preload">').link is None
+
+
 def test_a_figure_without_a_file_stays_as_it_is(book):
     bare = '<figure class="hicp"><img src="data:image/png;base64,AA" alt="A"></figure>'
     assert str(finished(book, bare)) == str(BeautifulSoup(bare, "html.parser"))

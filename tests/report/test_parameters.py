@@ -57,11 +57,10 @@ def test_source_hash_ignores_outputs_and_sees_every_cell(tmp_path):
 
 
 def test_profile_and_order_are_read(study):
-    profile = read_profile(
-        study / "notebooks" / "profiles.toml", "quick", read_notebooks(study / "notebooks")
-    )
-    assert profile.parameters == {"00_first": {"seed": 3}}
-    assert profile.after == {"01_second": ["00_first"]}
+    folder = study / "notebooks"
+    chosen, after = read_profile(folder / "profiles.toml", "quick", read_notebooks(folder))
+    assert chosen == {"00_first": {"seed": 3}}
+    assert after == {"01_second": ["00_first"]}
 
 
 @pytest.mark.parametrize(

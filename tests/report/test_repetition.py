@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.core.files import read_json
 from hicp_lib.report import prose
-from hicp_lib.report.prose import Results
+from hicp_lib.report.prose import Results, render_page
 from hicp_lib.report.repetition import VERDICTS, compare
 
 TABLE = pd.DataFrame(
@@ -29,7 +30,11 @@ def page(folder: Path, table: pd.DataFrame = TABLE, n: int = 3, time: float = 1.
     """Results of a notebook: three values of which one is measured, a table, a drawing of it, and times."""
     folder.mkdir(parents=True)
     shown = {"times": {"median_time_ms": time, "n": 4}, "ap": 0.5, "why": None} | values
-    stamp = {"git": {"commit": "c0ffee", "changed_files": 0}, "machine": {"cpu": "x"}, "parameters": {"n": n}}
+    stamp = {
+        "git": {"commit": "c0ffee", "changed_files": 0},
+        "machine": {"cpu": "x", "cores": 2},
+        "parameters": {"n": n},
+    }
     for name, content in (
         ("values", shown),
         ("provenance", stamp),
@@ -124,10 +129,15 @@ def test_the_page_s_figures(reference, tmp_path):
     own = tmp_path / "own"
     page(own / "02_x", TABLE.assign(ap=[0.53, 0.4, np.nan, 0.1]))
     found = Results(own, "full").repetition()
-    assert (found["n"], found["n_outside"], found["stamp"]["git"]["commit"]) == (11, 1, "c0ffee")
-    assert found["counts"].splitlines()[2] == "| 02_x | 11 | 9 | 0 | 1 | 1 |"
-    assert found["outside"].splitlines()[2:] == ["| 02_x | metrics, ap, row 4 | 0.8000 | 0.1000 |"]
+    assert found["stamp"]["git"]["commit"] == "c0ffee"
+    text = (CHECKOUT / "book" / "environment.md").read_text().split("## The same")[1].split("For scale")[0]
+    (tmp_path / "page.md").write_text(text)
+    lines = render_page(tmp_path / "page.md", Results(own, "full"), "full").splitlines()
+    assert "**10 of 11** outputs (90.9 %) are within tolerance." in lines
+    assert "| 02_x | 11 | 9 | 0 | 1 | 1 |" in lines
+    start = lines.index("The first of the 1 outside tolerance:")
+    assert lines[start + 4 : start + 6] == ["| 02_x | metrics, ap, row 4 | 0.8000 | 0.1000 |", ""]
     assert Results(own, "quick").repetition() is None
     page(tmp_path / "other" / "02_x", n=4)
     nothing = Results(tmp_path / "other", "full").repetition()
-    assert (nothing["n"], nothing["left_out"]) == (0, {"02_x": "was run with other parameters"})
+    assert (nothing["counts"], nothing["left_out"]) == ([], {"02_x": "was run with other parameters"})

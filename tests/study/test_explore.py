@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -93,7 +94,7 @@ def make_doses(folder: Path):
 def test_doses_have_pictures_of_some_and_precision_over_all(tmp_path):
     data, files = explore.doses(*make_doses(tmp_path))
     (dose,) = data["doses"]
-    assert dose["levels"] == [0.5, 2.5] and dose["unit"] == " m" and data["n_people"] == 4
+    assert dose["levels"] == ["0.5 m", "2.5 m"] and data["n_people"] == 4
     assert [len(views) for views in dose["views"]] == [3, 3] and len(files) == 6
     assert [at[0] for at in dose["ap"]] == [["mediapipe", "body", value, None, None] for value in (0.0, 1.0)]
 
@@ -321,6 +322,19 @@ def test_films_stand_still_until_they_are_played(opened):
     wait(browser, "return document.querySelector('svg[role=img]').ariaLabel.includes('movenet-thunder')")
     find(browser, "select")[0].send_keys("sitting, head")  # no such run with this detector
     wait(browser, "return document.querySelector('svg[role=img]').ariaLabel.includes('mediapipe')")
+
+
+@pytest.mark.browser
+def test_a_film_opens_on_the_first_picture_with_somebody_in_it(opened):
+    study, open_page = opened
+    run = make_run()
+    empty = dict.fromkeys(("keypoints_px", "scores", "keypoints_m"), [])
+    rows = run.frames.assign(t_s=(0.3, 0.6)).to_dict("records")
+    late = replace(run, frames=pd.DataFrame([rows[0] | empty, rows[1]]))
+    study.explorer("films", "Runs", *explore_space.runs([late]))
+    browser = open_page("films")
+    open_explorer(browser)
+    assert find(browser, "p")[0].text.startswith("0.6 s:")
 
 
 @pytest.mark.browser

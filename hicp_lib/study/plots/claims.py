@@ -5,13 +5,8 @@ import pandas as pd
 from hicp_lib.core.errors import InputError
 from hicp_lib.study.claims.verdicts import VERDICTS
 from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.palette import STYLES
 from hicp_lib.study.plots.style import COLUMN_IN, Figure, in_style, new_figure, texts
-
-# By `VERDICTS`: Okabe and Ito's palette; the hatch says the same without colour.
-_COLOURS = ("#009E73", "#56B4E9", "#D55E00", "#F0E442", "#CC79A7", "#D9D9D9")
-_HATCHES = ("", "//", "xx", "oo", "--", "..")
-_LOOKS = zip(VERDICTS, _COLOURS, _HATCHES, strict=True)
-_FILLS = {name: {"color": colour, "hatch": hatch, "edgecolor": "white"} for name, colour, hatch in _LOOKS}
 
 
 def verdicts(table: pd.DataFrame) -> Figure:
@@ -33,7 +28,7 @@ def _by_section(table: pd.DataFrame) -> Figure:
     counts = table.groupby(["section", "verdict"], sort=False).size().unstack(fill_value=0)
     counts = counts.reindex(index=sections, columns=VERDICTS, fill_value=0)
     figure, axis = new_figure(1, 1, COLUMN_IN, 1.5 + 0.32 * len(sections))
-    marks.stacked_bars(axis, counts, _FILLS)
+    marks.stacked_bars(axis, counts, STYLES["verdicts"])
     axis.set(yticks=range(len(sections)), yticklabels=sections)
     axis.invert_yaxis()
     axis.set(xlabel="claims", ylabel="section of the paper", xticks=range(int(counts.sum(axis=1).max()) + 1))

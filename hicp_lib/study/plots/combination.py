@@ -4,7 +4,7 @@ import pandas as pd
 
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_lines, in_style, new_figure, texts
+from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_lines, in_style, texts
 
 _MEASURES = {"AP": "average precision of hands", "share": "share of hands found"}
 _GROUPS = {"hand": "hands"}
@@ -22,20 +22,17 @@ def ingredients(table: pd.DataFrame, note: str) -> Figure:
     note : str
         What the data are, for the caption.
     """
-    variants, bodies = list(table["variant"].unique()), list(table["body"].unique())
-    shape = len(bodies), len(_MEASURES), WIDTH_IN, 0.7 + (0.6 + 0.3 * len(variants)) * len(bodies)
-    figure, axes = new_figure(*shape, sharey=True, sharex="col", squeeze=False)
-    pens = marks.subset_dots(table["subset"].unique())
-    for row, body in zip(axes, bodies, strict=True):
-        for axis, measure in zip(row, _MEASURES, strict=True):
-            part, bounds = table[table["body"] == body], (measure, f"{measure}_low", f"{measure}_high")
-            marks.dots_in_rows(axis, part, "variant", "subset", variants, pens, bounds=bounds)
-        row[0].set_title(f"bodies by {body}")
-    for axis, label in zip(axes[-1], _MEASURES.values(), strict=True):
-        axis.set(xlabel=label, xlim=(0, None))
-    marks.name_rows(axes[0, 0], variants)
-    marks.legend_below(figure, axes[0, 0])
-    ends = table[table["variant"].isin([variants[0], variants[-1]])]
+    parts = [
+        table.rename(columns={of: "value", f"{of}_low": "low", f"{of}_high": "high"}).assign(measure=of)
+        for of in _MEASURES
+    ]
+    pens, by = marks.subset_dots(table["subset"].unique()), ["body", "measure"]
+    figure, _, panels = marks.dot_chart(pd.concat(parts), "variant", "subset", pens, WIDTH_IN, by)
+    for axis, _, body, measure in panels:
+        axis.set(xlabel=_MEASURES[measure], xlim=(0, None))
+        axis.set_title(f"bodies by {body}" if measure == "AP" else "")
+        axis.label_outer()
+    ends = table[table["variant"].isin(table["variant"].iloc[[0, -1]])]
     gains = ends.groupby(["body", "subset"], sort=False)["AP"].agg(["first", "last"]).reset_index()
     return Figure(figure, *texts("ingredients", note=note, said=gains), table)
 
@@ -61,11 +58,8 @@ def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, min_term: flo
         colour = detector_colour(of_case["detector"].iloc[0])
         _draw_curves(axis, of_case[of_case["count"] >= _FEWEST], colour)
         axis.set_title(case, fontsize=8)
-        axis.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
-    for axis in axes[:, 0]:
-        axis.set(ylabel="share of hits")
-    for axis in axes[-1]:
-        axis.set(xlabel="score")
+        axis.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), xlabel="score", ylabel="share of hits")
+        axis.label_outer()
     marks.legend_below(figure, axes[0, 0])
     told = {"min_term": min_term, "fewest": _FEWEST, "said": errors.replace({"group": _GROUPS})}
     return Figure(figure, *texts("reliability_curves", note=note, **told), curves)

@@ -16,7 +16,7 @@ from hicp_lib.formats.annotations import Annotations
 from hicp_lib.simulation.body.joints import pose_from_joints, radians
 from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import BODY_COLOUR, HEAD_COLOUR, SUBSET_COLOURS
+from hicp_lib.study.plots.palette import BODY_COLOUR, HEAD_COLOUR, STYLES
 from hicp_lib.study.plots.people import draw_truth, picture_grid
 from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_style, new_figure, texts
 
@@ -149,12 +149,9 @@ def labelled_share(subsets: Mapping[str, Annotations], note: str) -> Figure:
         for part, indices in _PARTS.items()
         if len(labelled)
     )
-    figure, axis = new_figure(1, 1, WIDTH_IN, 3.8)
-    pens, parts = marks.subset_dots(subsets), list(_PARTS)
-    marks.dots_in_rows(axis, table, "part", "subset", parts, pens, bounds=["share"] * 3, capsize=0)
-    axis.set(xlabel="share of people", xlim=(-0.02, 1.02))
-    marks.name_rows(axis, parts)
-    marks.legend_below(figure, axis)
+    bare: dict[str, Any] = {"bounds": ["share"] * 3, "capsize": 0}
+    figure, axes, _ = marks.dot_chart(table, "part", "subset", marks.subset_dots(subsets), WIDTH_IN, **bare)
+    axes[0, 0].set(xlabel="share of people", xlim=(-0.02, 1.02))
     least = table.sort_values("share", kind="stable").drop_duplicates("subset")
     return Figure(figure, *texts("labelled_share", note=note, said=least), table)
 
@@ -176,7 +173,7 @@ def crop_sizes(table: pd.DataFrame, min_pixels: int, note: str) -> Figure:
     sizes = sizes[sizes > 0]
     figure, axis = new_figure(1, 1, WIDTH_IN, 2.6)
     bins = np.geomspace(max(sizes.min(), 1), sizes.max() * 1.01, 30)
-    axis.hist(sizes[sizes >= min_pixels], bins, color=SUBSET_COLOURS["basic"], label="kept")
+    axis.hist(sizes[sizes >= min_pixels], bins, color=STYLES["subsets"]["basic"]["color"], label="kept")
     axis.hist(sizes[sizes < min_pixels], bins, color="#BBBBBB", label="too small")
     axis.axvline(min_pixels, color="black", lw=1.2, ls="--")
     axis.set(xscale="log", xlabel="area of the crop [px]", ylabel="people")
@@ -211,7 +208,7 @@ def layouts() -> Figure:
         rows.append((name.replace("\n", " "), len(given), int((given >= 0).sum())))
         _draw_layout(axis, points_m, given, f"{name}, {len(given)}")
     _draw_layout(axes.flat[-1], points_m, LEFT_HAND, "a left hand, the same\nof all that give it")
-    marks.legend_below(figure, axes.flat[3], ncols=2)
+    marks.legend_below(figure, axes.flat[3])
     table = pd.DataFrame(rows, columns=["layout", "points", "drawn"])
     return Figure(figure, *texts("layouts", said=table), table)
 

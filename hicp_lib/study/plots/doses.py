@@ -12,13 +12,22 @@ from hicp_lib.core.images import read_image
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
-from hicp_lib.study.plots.people import draw_detections, picture_grid, title_pictures
+from hicp_lib.study.plots.people import draw_detections, picture_grid
 from hicp_lib.study.plots.style import TEXTS, WIDTH_IN, Figure, in_style, texts
 
-_UNITS = {"distance": "{:g} m", "resolution": "{:g} px"}
 _LOGARITHMIC = ("light", "resolution", "distance")
 _GROUPS = {"body": "Bodies", "hand": "Hands"}
-_MEASURES = {"AP": "average precision", "visible keypoints hit": "share of visible keypoints hit"}
+
+
+def level_text(dose: str, level: float) -> str:
+    """A level of a dose in its unit.
+
+    Examples
+    --------
+    >>> level_text("distance", 2.5), level_text("light", 0.05)
+    ('2.5 m', '5%')
+    """
+    return TEXTS["levels"].get(dose, "{:.0%}").format(level)
 
 
 @in_style
@@ -55,27 +64,29 @@ def dose_pictures(
                 image = draw_detections(image, replace(people, keypoints_px=points_px), detector)
                 n_found[detector] += len(people) > 0
             rows.setdefault(dose, []).append(image)
-            titles.append(_UNITS.get(dose, "{:.0%}").format(level))
+            titles.append(level_text(dose, level))
     told = texts("dose_pictures", doses=list(rows), n=len(titles), seen=pd.Series(n_found))
-    drawn = picture_grid(list(rows.values()), *told, row_titles=list(rows), cell_in=1)
-    title_pictures(drawn, titles, 8)
+    drawn = picture_grid(list(rows.values()), *told, list(rows), titles, cell_in=1, title_pt=8)
     marks.add_keys(drawn.figure.axes[0], detectors, {})
     marks.legend_below(drawn.figure, drawn.figure.axes[0])
     return drawn
 
 
 @in_style
-def dose_curves(table: pd.DataFrame, group: str, measure: str = "AP") -> Figure:
+def dose_curves(table: pd.DataFrame, group: str, measure: str = "AP", note: str = "") -> Figure:
     """AP, or another measure, against each dose.
 
     Parameters
     ----------
     table : pd.DataFrame
-        As from `hicp_lib.evaluation.failures.dose_curves.dose_curves`.
+        As from `hicp_lib.evaluation.failures.dose_curves.dose_curves`, or from
+        `hicp_lib.study.observed.observed_curves`.
     group : {"body", "hand"}
         Of keypoints.
     measure : str, optional
-        One of `hicp_lib.evaluation.failures.dose_curves.MEASURES`.
+        Of those in the table.
+    note : str, optional
+        What the data are, for the caption of what was observed and not varied.
     """
     table = table[table["group"] == group]
     rows = table[table["measure"] == measure].astype({"low": float, "high": float})
@@ -95,12 +106,13 @@ def dose_curves(table: pd.DataFrame, group: str, measure: str = "AP") -> Figure:
             axis.set_xscale("log")
             axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
-    figure.supylabel(_MEASURES[measure], fontsize=10)
-    marks.legend_below(figure, axes[0, 0], ncols=2)
+    label = "average precision" if measure == "AP" else f"share of {measure}"
+    figure.supylabel(label, fontsize=10)
+    marks.legend_below(figure, axes[0, 0])
     known = rows.dropna(subset="value")
     lowest = known.loc[known.groupby("detector", sort=False)["value"].idxmin()]
-    told = {"measure": _MEASURES[measure], "group": _GROUPS[group], "said": lowest}
-    return Figure(figure, *texts("dose_curves", **told), table)
+    told = {"measure": label, "group": _GROUPS[group], "said": lowest, "note": note}
+    return Figure(figure, *texts("observed_curves" if note else "dose_curves", **told), table)
 
 
 @in_style

@@ -1,4 +1,4 @@
-"""Figures of the 2D comparison: precision against recall, the loss without a head, who is found, time."""
+"""Figures of the 2D comparison: precision against recall, what is lost of it and why, who is found, time."""
 
 from typing import Any
 
@@ -6,24 +6,17 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.evaluation.ap.found_and_placed import FOUND, OKS_OF_FOUND
-from hicp_lib.study.photographs import PHOTOGRAPHED, RENDERED
+from hicp_lib.evaluation.ap.loss_shares import SHARES
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import detector_colour, detector_marker
+from hicp_lib.study.plots.palette import STYLES, detector_colour, detector_marker
 from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_style, new_figure, texts
 
 GROUP_TITLES = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
+_AP = {"AP": "average precision (.5:.95)"}
 # By OKS threshold: precision, recall, and how much of a marker is filled.
 _THRESHOLDS = {
     ".5": ("AP50", "AR50", "none"), ".75": ("AP75", "AR75", "left"), ".5:.95": ("AP", "AR", "full"),
 }  # fmt: skip
-# Marks in the row of a detector, from above: marker, and its face if not filled.
-_SUBSETS: dict[str, tuple[str, str | None]] = {
-    "whole images": ("^", None), "basic": ("o", None), "headless": ("o", "white"), "near": ("D", None),
-}  # fmt: skip
-_PENS = {
-    RENDERED: {"color": "#0072B2", "fmt": "o", "label": RENDERED},
-    PHOTOGRAPHED: {"color": "#D55E00", "fmt": "s", "label": PHOTOGRAPHED},
-}
 
 
 @in_style
@@ -50,8 +43,8 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
     for threshold, (*_, fill) in _THRESHOLDS.items():
         pens[f"OKS {threshold}"] = {"marker": "o", "ls": "", "fillstyle": fill}
     marks.add_keys(axes[0, 0], (), pens)
-    marks.legend_below(figure, axes[0, 0], ncols=_legend_columns(pens))
-    said = extreme(table[table["metric"] == "AP"], "idxmax")
+    marks.legend_below(figure, axes[0, 0])
+    said = _extreme(table[table["metric"] == "AP"], "idxmax")
     return Figure(figure, *texts("precision_recall", note=data_note, said=said), table)
 
 
@@ -78,12 +71,7 @@ def _short_title(group: str) -> str:
     return GROUP_TITLES.get(group, group).partition(" (")[0].lower()
 
 
-def _legend_columns(names) -> int:
-    """How many columns of these names a figure is wide enough for."""
-    return 2 if max(map(len, names)) < 30 else 1
-
-
-def extreme(rows: pd.DataFrame, which: str) -> pd.DataFrame:
+def _extreme(rows: pd.DataFrame, which: str) -> pd.DataFrame:
     """Of each subset the row with the highest (idxmax) or lowest value, of the first group of keypoints."""
     first = rows[(rows["group"] == rows["group"].iloc[0]) & rows["value"].notna()]
     return first.loc[getattr(first.groupby("subset", sort=False)["value"], which)()]
@@ -107,7 +95,7 @@ def loss_without_head(table: pd.DataFrame, data_note: str) -> Figure:
     `table` as for `precision_recall`; only rows with metric "AP" are drawn.
     """
     rows = table[table["metric"] == "AP"]
-    figure = _by_subset(rows, {"AP": "average precision (.5:.95)"}, "metric")
+    figure = _by_subset(rows, _AP, "metric")
     drops = rows.pivot_table(index=["detector", "group"], columns="subset", values="value", sort=False)
     change = drops.get("headless", np.nan) - drops.get("basic", np.nan)
     return Figure(figure, *texts("loss_without_head", note=data_note, said=change.dropna()), rows)
@@ -122,29 +110,29 @@ def found_and_placed(table: pd.DataFrame, data_note: str) -> Figure:
     labels = {FOUND: "share of people found", OKS_OF_FOUND: "mean OKS of the found"}
     rows = table[table["what"].isin(labels)]
     figure = _by_subset(rows, labels, "what")
-    fewest, roughest = (extreme(rows[rows["what"] == what], "idxmin") for what in labels)
+    fewest, roughest = (_extreme(rows[rows["what"] == what], "idxmin") for what in labels)
     return Figure(figure, *texts("found_and_placed", note=data_note, said=fewest, placed=roughest), table)
 
 
-def _by_subset(rows: pd.DataFrame, labels: dict[str, str], across: str):
+def _by_subset(rows: pd.DataFrame, labels: dict[str, str], across: str, xlim=(-0.03, 1.03)):
     """Dots of each detector by subset; panels by group of keypoints, and by the column `across`, named."""
     groups = rows["group"].unique()
     names = {group: list(rows.loc[rows["group"] == group, "detector"].unique()) for group in groups}
     heights = [len(of_group) + 0.8 for of_group in names.values()]
     height_in = 0.5 * sum(heights) + 0.9
-    shared: dict[str, Any] = {"height_ratios": heights, "sharex": "col", "sharey": "row"}
+    shared: dict[str, Any] = {"height_ratios": heights, "sharex": True, "sharey": "row"}
     figure, axes, panels = marks.panels(rows, ["group", across], WIDTH_IN, height_in, **shared)
     for axis, part, group, what in panels:
-        dots_by_subset(axis, part, names[group])
-        axis.set(xlim=(-0.03, 1.03), xlabel=labels[what])
+        _dots_by_subset(axis, part, names[group])
+        axis.set(xlim=xlim, xlabel=labels[what])
         axis.label_outer()
     for axis, group in zip(axes[:, 0], groups, strict=True):
         axis.set_title(GROUP_TITLES.get(group, group))
-    marks.legend_below(figure, axes, ncols=4)
+    marks.legend_below(figure, axes)
     return figure
 
 
-def dots_by_subset(axis, rows: pd.DataFrame, names: list[str]) -> None:
+def _dots_by_subset(axis, rows: pd.DataFrame, names: list[str]) -> None:
     """Dots with whiskers in rows named after detectors, a mark per subset; Basic and Headless are joined.
 
     Parameters
@@ -155,18 +143,17 @@ def dots_by_subset(axis, rows: pd.DataFrame, names: list[str]) -> None:
     names : list of str
         The detectors, the first on top.
     """
-    subsets = [name for name in _SUBSETS if name in set(rows["subset"])]
+    looks = {name: look for name, look in STYLES["subset_marks"].items() if name in set(rows["subset"])}
+    subsets = list(looks)
     places = rows["subset"].map(subsets.index).map(lambda k: marks.offset(k, len(subsets), 0.22))
     for detector, of in rows.assign(y=places).dropna(subset="value").groupby("detector", sort=False):
         of, colour = of.assign(y=of["y"] + names.index(detector)), detector_colour(detector.partition(",")[0])
         pair = of[of["subset"].isin(["basic", "headless"])]
         axis.plot(pair["value"], pair["y"], "-", lw=3, alpha=0.45, color=colour)
         for subset, one in of.groupby("subset"):
-            marker, face = _SUBSETS[subset]
-            marks.dots(axis, one, one["y"], fmt=marker, color=colour, mfc=face, ms=6, capsize=0)
+            marks.dots(axis, one, one["y"], **looks[subset], fmt="", ls="", color=colour, ms=6, capsize=0)
     marks.name_rows(axis, [name.replace(", ", ",\n") for name in names])
-    keys = {name: {"marker": marker, "mfc": face, "ls": ""} for name, (marker, face) in _SUBSETS.items()}
-    marks.add_keys(axis, (), {name.capitalize(): keys[name] for name in subsets})
+    marks.add_keys(axis, (), {name.capitalize(): look | {"ls": ""} for name, look in looks.items()})
 
 
 @in_style
@@ -184,9 +171,9 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
             apart = 0.05 + 0.2 * names.index(detector) / len(names), 0.2  # of the panel's diagonal
             axis.step(*steps, where="pre", label=detector, markevery=apart, **_pen(detector))
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
-    marks.legend_below(figure, axes, ncols=_legend_columns(names))
+    marks.legend_below(figure, axes)
     medians = table.groupby(["subset", "group", "detector"], sort=False)["oks"].median().rename("value")
-    said = extreme(medians.reset_index(), "idxmin")
+    said = _extreme(medians.reset_index(), "idxmin")
     return Figure(figure, *texts("oks_curves", note=data_note, said=said), table)
 
 
@@ -206,14 +193,32 @@ def time_per_image(table: pd.DataFrame, machine_note: str) -> Figure:
 @in_style
 def precisions(table: pd.DataFrame, note: str) -> Figure:
     """AP of bodies in a run and on photographs; `table` as from `hicp_lib.study.photographs.beside`."""
-    names = list(table["detector"].unique())
-    size = WIDTH_IN, 1.4 + 0.5 * len(names)
-    figure, axes, panels = marks.panels(table, ["subset"], *size, sharex=True, sharey=True)
-    for axis, rows, subset in panels:
-        marks.dots_in_rows(axis, rows, "detector", "where", names, _PENS)
+    figure, _, panels = marks.dot_chart(table, "detector", "where", STYLES["places"], WIDTH_IN, ["subset"])
+    for axis, _, subset in panels:
         axis.set(xlabel="average precision", xlim=(0, 1))
         axis.set_title(subset.capitalize(), fontsize=9)
-    marks.name_rows(axes[0, 0], names)
-    marks.legend_below(figure, axes[0, 0], ncols=2)
     best = table.loc[table.groupby(["where", "subset"], sort=False)["value"].idxmax()]
     return Figure(figure, *texts("precisions", note=note, said=best), table)
+
+
+@in_style
+def box_sources(table: pd.DataFrame, data_note: str) -> Figure:
+    """Average precision by where the box comes from; `table` as from `metric_table`, of `box_variants`."""
+    rows = table[table["metric"] == "AP"]
+    figure = _by_subset(rows, _AP, "metric")
+    values = rows.pivot_table(index="subset", columns="detector", values="value", sort=False)
+    whole, _, true_boxes, *_ = rows["detector"].unique()
+    gained = (values[true_boxes] - values[whole]).dropna().round(2) + 0.0  # never -0.00
+    told = texts("box_sources", note=data_note, said=_extreme(rows, "idxmax"), gained=gained)
+    return Figure(figure, *told, table)
+
+
+@in_style
+def loss_shares(table: pd.DataFrame, data_note: str) -> Figure:
+    """What keeps average precision from 1; `table` as from `hicp_lib.evaluation.ap.loss_shares`."""
+    rows = table[~table["detector"].str.contains(" less ")]
+    rows = rows.iloc[np.argsort(rows["share"].map(SHARES.index), kind="stable")]
+    labels = {share: f"loss of AP,\n{share}" for share in SHARES}
+    figure = _by_subset(rows.assign(group="body"), labels, "share", xlim=None)
+    told = texts("loss_shares", note=data_note, said=rows[rows["subset"] == "headless"])
+    return Figure(figure, *told, rows)

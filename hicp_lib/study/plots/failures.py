@@ -12,25 +12,20 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
 from hicp_lib.datasets.visibility import CLASSES, MIN_PEOPLE
 from hicp_lib.evaluation.cases import Found, Truth
-from hicp_lib.evaluation.failures.error_kinds import HITS, KINDS
-from hicp_lib.evaluation.failures.placed_keypoints import STATES
+from hicp_lib.evaluation.failures.error_kinds import HITS
 from hicp_lib.evaluation.failures.without_head import HEAD_POINTS
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.inspection.skeletons import draw_rings
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.evaluation import GROUP_TITLES
-from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid, title_pictures
-from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_lines, in_style, new_figure, texts
+from hicp_lib.study.plots.palette import STYLES, detector_colour
+from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
+from hicp_lib.study.plots.style import WIDTH_IN, Figure, in_lines, in_style, texts
 
 _TRUTH_COLOUR = "#39D353"
 _ONE_CROP = ["subset", "image_id", "annotation_id"]
 _TITLES = ("detector", "case", "mistakes")  # what stands over a picture, but for what names its row
 _BLIND = 0.05  # a class in which no detector has a higher AP is one that all are blind to
-_KIND_COLOURS = ("#0072B2", "#8FC6E8", "#F0E442", "#CC79A7", "#D55E00", "#BDBDBD", "#5F5F5F")
-_EDGE = {"edgecolor": "white", "lw": 0.4}
-_KIND_STYLES = {kind: _EDGE | {"color": c} for kind, c in zip(KINDS, _KIND_COLOURS, strict=True)}
-_STATE_STYLES = dict(zip(STATES[:3], (("-", "o"), ("--", "s"), (":", "^")), strict=True))
 
 
 def class_examples(classes: pd.DataFrame, truth: Truth, folders: Mapping[str, Path], note: str) -> Figure:
@@ -63,18 +58,15 @@ def class_precision(table: pd.DataFrame, note: str) -> Figure:
     table = table[table["metric"].isin(["AP", "AR"])]
     rows = table[table["metric"] == "AP"]
     rows = rows[(rows["group"] != "body") | rows.index.isin(marks.own_bodies(rows).index)]
-    names, detectors = [name for name in CLASSES if name in set(rows["class"])], rows["detector"].unique()
-    size = WIDTH_IN, 1.4 + (0.12 + 0.1 * len(detectors)) * len(names)
-    figure, axes, panels = marks.panels(rows, ["group"], *size, sharey=True)
+    names = [name for name in CLASSES if name in set(rows["class"])]
+    pens = marks.detector_dots(rows["detector"].unique())
+    figure, axes, panels = marks.dot_chart(rows, "class", "detector", pens, WIDTH_IN, ["group"], names)
     for axis, of_group, group in panels:
-        pens = marks.detector_dots(of_group["detector"].unique())
-        marks.dots_in_rows(axis, of_group, "class", "detector", names, pens)
         _say_too_few(axis, names, set(of_group.loc[of_group["value"].isna(), "class"]))
         axis.set(xlabel="average precision", xlim=(-0.03, 1.03))
         axis.set_title(GROUP_TITLES.get(group, group), fontsize=8)
     counts = rows.drop_duplicates("class").set_index("class")["n_people"]
     marks.name_rows(axes[0, 0], [textwrap.fill(f"{name} ({counts.get(name, 0)})", 22) for name in names])
-    marks.legend_below(figure, axes, ncols=2)
     best = rows[rows["group"] == "body"].sort_values("value", ascending=False, kind="stable")
     best = best.dropna(subset="value").drop_duplicates("class")
     said = {"said": best[best["value"] >= _BLIND], "blind": list(best.loc[best["value"] < _BLIND, "class"])}
@@ -108,7 +100,7 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
     figure, axes, panels = marks.panels(rows, ["detector", "group"], WIDTH_IN, height_in, sharex=True)
     for axis, of_detector, detector, _ in panels:
         part = of_detector.pivot(index=by, columns="kind", values="share").reindex(order)
-        marks.stacked_bars(axis, part, _KIND_STYLES)
+        marks.stacked_bars(axis, part, STYLES["error_kinds"])
         _say_too_few(axis, order, set(part.index[part.isna().all(axis=1)]))
         axis.set(xlim=(0, 1), title=in_lines(detector))
         marks.name_rows(axis, order)
@@ -123,14 +115,11 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
 def head_change(table: pd.DataFrame, note: str) -> Figure:
     """Change of the hit rate of each keypoint when the head is cut off; from `change_per_keypoint`."""
     rows = marks.own_bodies(table)
-    names, detectors = (list(rows[name].unique()) for name in ("keypoint", "detector"))
-    figure, axis = new_figure(1, 1, WIDTH_IN, 1.2 + (0.1 + 0.1 * len(detectors)) * len(names))
-    pens, change = marks.detector_dots(detectors), ("change", "low", "high")
-    marks.dots_in_rows(axis, rows, "keypoint", "detector", names, pens, bounds=change)
-    axis.axvline(0, color="#444444", lw=1)
-    marks.name_rows(axis, [name.replace("_", " ") for name in names])
-    axis.set(xlabel="change of the share of keypoints hit, without the head")
-    marks.legend_below(figure, axis, ncols=2)
+    rows = rows.assign(keypoint=rows["keypoint"].str.replace("_", " "))
+    pens, change = marks.detector_dots(rows["detector"].unique()), ("change", "low", "high")
+    figure, axes, _ = marks.dot_chart(rows, "keypoint", "detector", pens, WIDTH_IN, bounds=change)
+    axes[0, 0].axvline(0, color="#444444", lw=1)
+    axes[0, 0].set(xlabel="change of the share of keypoints hit, without the head")
     changes = rows.groupby("detector", sort=False)["change"].mean()
     return Figure(figure, *texts("head_change", note=note, said=changes), table)
 
@@ -166,11 +155,8 @@ def invented_heads(heads: pd.DataFrame, folder: Path, truth: Annotations, found:
         titles.append(f"{detector}\nscore of the head {scores[detector, image_id]:.2f}")
     beyond = (heads["landed"] == "outside").groupby(heads["detector"], sort=False).mean()
     said = [" ".join(title.split()) for title in titles]
-    drawn = picture_grid(
-        [pictures], *texts("invented_heads", note=note, said=said, beyond=beyond), cell_in=1.8
-    )
-    title_pictures(drawn, titles, 7)
-    return drawn
+    told = texts("invented_heads", note=note, said=said, beyond=beyond)
+    return picture_grid([pictures], *told, titles=titles, cell_in=1.8, title_pt=7)
 
 
 @in_style
@@ -179,15 +165,11 @@ def false_presence(table: pd.DataFrame, note: str) -> Figure:
     rows = marks.own_bodies(table)
     rows = rows[(rows["n"] >= MIN_PEOPLE) | (rows["n"].max() < MIN_PEOPLE)]
     rows = rows.assign(row=rows["part"] + ", " + rows["subset"] + " (" + rows["n"].astype(str) + ")")
-    names, detectors, decisions = (list(rows[name].unique()) for name in ("row", "detector", "decision"))
-    size = WIDTH_IN, 1.5 + (0.1 + 0.13 * len(detectors)) * len(names)
-    figure, axes, panels = marks.panels(rows, ["decision"], *size, sharey=True)
-    for axis, of_panel, decision in panels:
-        marks.dots_in_rows(axis, of_panel, "row", "detector", names, marks.detector_dots(detectors))
+    pens = marks.detector_dots(rows["detector"].unique())
+    figure, _, panels = marks.dot_chart(rows, "row", "detector", pens, WIDTH_IN, ["decision"])
+    for axis, _, decision in panels:
         axis.set(xlim=(-0.02, None), xlabel="share given inside")
         axis.set_title(textwrap.fill(decision, 24), fontsize=8)
-    marks.name_rows(axes[0, 0], names)
-    marks.legend_below(figure, axes, ncols=2)
     heads = rows[(rows["part"] == "head") & (rows["subset"] == "headless")]
     return Figure(figure, *texts("false_presence", note=note, said=heads), table)
 
@@ -199,9 +181,9 @@ def scores_by_state(table: pd.DataFrame, note: str) -> Figure:
     rows = rows[rows["n"] >= MIN_PEOPLE]
     figure, (axes,), panels = marks.panels(rows, ["detector"], WIDTH_IN, 2.9, sharey=True)
     for axis, of_detector, detector in panels:
-        for state, (line, marker) in _STATE_STYLES.items():
+        for state, style in STYLES["states"].items():
             part = of_detector[of_detector["state"] == state]
-            pen = {"ls": line, "marker": marker, "ms": 4, "capsize": 2, "color": detector_colour(detector)}
+            pen = style | {"ms": 4, "capsize": 2, "color": detector_colour(detector)}
             axis.errorbar(part["score"], part["value"], marks.whiskers(part), label=state, **pen)
         axis.plot([0, 1], [0, 1], "--", color="#AAAAAA", lw=1)
         axis.set(xlim=(0, 1.02), ylim=(-0.02, 1.02), xlabel="score")
@@ -251,7 +233,5 @@ def gallery(
     told = {"note": note, "n": len(cases), "rows": list(dict.fromkeys(said))}
     name = "gallery" if row == "detector" else "lost_points"
     width = max(map(len, pictures.values()))
-    grid = list(pictures.values()), *texts(name, **told), list(pictures)
-    drawn = picture_grid(*grid, cell_in=WIDTH_IN / width)
-    title_pictures(drawn, titles, 7)
-    return drawn
+    grid = list(pictures.values()), *texts(name, **told), list(pictures), titles
+    return picture_grid(*grid, cell_in=WIDTH_IN / width, title_pt=7)

@@ -7,30 +7,29 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hicp_lib.study.plots.palette import SUBSET_COLOURS, SUBSET_MARKERS, detector_colour, detector_marker
+from hicp_lib.study.plots.palette import STYLES, detector_colour, detector_marker
 from hicp_lib.study.plots.style import in_lines, new_figure
 
 _BOUNDS = ("value", "low", "high")
 _NO_DETECTOR = "#444444"  # what stands in a legend for all detectors
 
 
-def legend_below(figure, axes, ncols: int = 4, fontsize: float = 9) -> None:
-    """A legend under a figure, with each label of its axes once.
+def legend_below(figure, axes) -> None:
+    """A legend under a figure, with each label of its axes once, in as many columns as there is room for.
 
     Parameters
     ----------
     figure : matplotlib.figure.Figure
     axes : matplotlib.axes.Axes or array of matplotlib.axes.Axes
-    ncols : int
-        Columns of the legend.
-    fontsize : float
-        In points.
     """
     found = {}
     for axis in np.ravel(axes):
         pairs = zip(*axis.get_legend_handles_labels(), strict=True)
         found.update({in_lines(label): handle for handle, label in pairs})
-    figure.legend(found.values(), found, loc="outside lower center", ncols=ncols, fontsize=fontsize)
+    longest = max((len(line) for label in found for line in label.split("\n")), default=0)
+    fitting = int(figure.get_figwidth() / (0.6 + 0.075 * longest))  # inches of a column, at 9 points
+    ncols = min(max(fitting, 1), 4)
+    figure.legend(found.values(), found, loc="outside lower center", ncols=ncols, fontsize=9)
 
 
 def add_keys(axis, detectors: Iterable[str], others: Mapping[str, dict[str, Any]]) -> None:
@@ -50,7 +49,7 @@ def add_keys(axis, detectors: Iterable[str], others: Mapping[str, dict[str, Any]
 
 
 def panels(table: pd.DataFrame, by: Sequence[str], width_in: float, height_in: float, **shared: Any):
-    """A figure with a panel for each value of a column (across), or of two (down, across).
+    """A figure with a panel for each value of a column (across), or of two (down, across), or with one panel.
 
     Parameters
     ----------
@@ -71,7 +70,7 @@ def panels(table: pd.DataFrame, by: Sequence[str], width_in: float, height_in: f
         Of each panel its axis, its rows of the table, which may be none, and the value of each column.
     """
     values = [table[name].unique() for name in by]
-    n_rows, n_columns = [1, *(max(len(of), 1) for of in values)][-2:]
+    n_rows, n_columns = [1, 1, *(max(len(of), 1) for of in values)][-2:]
     wrap = shared.pop("wrap", n_columns)
     if n_rows == 1:
         n_rows, n_columns = -(-n_columns // wrap), min(n_columns, wrap)
@@ -162,10 +161,7 @@ def detector_dots(detectors: Iterable[str]) -> dict[str, dict[str, Any]]:
 
 def subset_dots(subsets: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Colour, marker and label of each subset's `dots`."""
-    pens = {
-        name: {"color": SUBSET_COLOURS.get(name), "fmt": SUBSET_MARKERS.get(name, "o")} for name in subsets
-    }
-    return {name: pen | {"label": name} for name, pen in pens.items()}
+    return {name: STYLES["subsets"].get(name, {}) | {"label": name} for name in subsets}
 
 
 def own_bodies(table: pd.DataFrame) -> pd.DataFrame:
@@ -201,8 +197,56 @@ def dots_in_rows(
     """
     for k, (case, pen) in enumerate(pens.items()):
         part = table[table[beside] == case]
+        if part.empty:
+            continue
         y = np.array([names.index(name) for name in part[down]]) + offset(k, len(pens), 0.8 / len(pens))
         dots(axis, part, y, **pen | shared)
+
+
+def dot_chart(
+    table: pd.DataFrame,
+    down: str,
+    beside: str,
+    pens: Mapping[str, dict],
+    width_in: float,
+    by: Sequence[str] = (),
+    names: Sequence[str] | None = None,
+    **shared: Any,
+):
+    """`panels` with `dots_in_rows`, as high as these need; rows are named, and the pens in a legend below.
+
+    Parameters
+    ----------
+    table : pd.DataFrame
+    down, beside : str
+        The columns of rows and of what stands in each.
+    pens : mapping of str to dict
+        Options of `dots` by the value of `beside`.
+    width_in : float
+        The figure's width in inches.
+    by : sequence of str
+        Columns that make the panels; none for one panel.
+    names : sequence of str, optional
+        The rows from above; by default in the order they come in.
+    **shared : dict
+        Options of all `dots`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    array of matplotlib.axes.Axes
+    list of tuple
+        As from `panels`.
+    """
+    names = list(table[down].unique() if names is None else names)
+    n_below = table[by[0]].nunique() if len(by) == 2 else 1
+    height_in = 0.9 + n_below * (0.5 + (0.12 + 0.1 * len(pens)) * len(names))
+    figure, axes, found = panels(table, by, width_in, height_in, sharex="col", sharey=True)
+    for axis, part, *_ in found:
+        dots_in_rows(axis, part, down, beside, names, pens, **shared)
+    name_rows(axes[0, 0], names)
+    legend_below(figure, axes)
+    return figure, axes, found
 
 
 def stacked_bars(axis, lengths: pd.DataFrame, styles: Mapping[str, dict[str, Any]]) -> None:

@@ -12,7 +12,7 @@ from hicp_lib.evaluation.space.error_budget import AGAINST_MOCAP, TOTALS
 from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS
 from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import PERFECT, TRUTH_COLOUR, detector_colour, detector_marker
+from hicp_lib.study.plots.palette import PERFECT, STYLES, TRUTH_COLOUR, detector_colour, detector_marker
 from hicp_lib.study.plots.style import COLUMN_IN, TEXTS, Figure, in_style, new_figure, texts
 from hicp_lib.study.table_format import in_cm
 
@@ -103,7 +103,7 @@ def residuals(
         axis.axhline(0, color=TRUTH_COLOUR, lw=1)
         axis.set(ylabel=label, ylim=(-104 * _MOST_M, 104 * _MOST_M))
     axes[-1].set(xlabel="time [s]")
-    marks.legend_below(figure, axes, ncols=2)
+    marks.legend_below(figure, axes)
     said = found.groupby("detector", sort=False)["error_m"].agg(["size", "median"]).reset_index()
     said["median"] *= 100
     told = {"min_score": min_score, "beyond_cm": 100 * _MOST_M, "floor": _floor(errors), "note": note}
@@ -112,7 +112,6 @@ def residuals(
     return Figure(figure, *texts("residuals", **told, said=said), errors[columns])
 
 
-_PENS = {"paper": {"color": "#D55E00", "fmt": "s"}, "robust": {"color": "#0072B2", "fmt": "o"}}
 _TOTALS_APART = 0.5  # rows
 
 
@@ -141,7 +140,7 @@ def error_budget(budget: pd.DataFrame, view: str, paper: pd.DataFrame, note: str
             y = of["source"].map(rows) + marks.offset(methods.index(method), len(methods), 0.3)
             is_gain, bounds = kind == "gain", ("value_m", "low_m", "high_m")
             label = f"{method} lifting, {'gained without' if is_gain else 'alone'}"
-            pen = _PENS[method] | {"label": label} | ({"mfc": "white"} if is_gain else {})
+            pen = STYLES["liftings"][method] | {"label": label} | ({"mfc": "white"} if is_gain else {})
             marks.dots(axis, of, y, bounds, 100, **pen)
         if AGAINST_MOCAP in rows:
             theirs_cm = 100 * paper.loc[paper["keypoint"].str.endswith(part), "median_m"]
@@ -150,7 +149,7 @@ def error_budget(budget: pd.DataFrame, view: str, paper: pd.DataFrame, note: str
         axis.set(title=f"{part}s", xlabel="error, or gain [cm]")
         axis.axvline(0, color="#888888", lw=0.8)
     axes[0, 0].set(yticks=[*rows.values()], yticklabels=[*rows], ylim=(max(rows.values()) + 0.6, -0.6))
-    marks.legend_below(figure, axes, ncols=2)
+    marks.legend_below(figure, axes)
     beside = ", against motion capture beside the paper's best medians" if AGAINST_MOCAP in rows else ""
     first = table[table["kind"] == "alone"].sort_values("value_m", ascending=False)
     first = first.drop_duplicates(["part", "method"]).set_index(["part", "method", "source"])["value_m"]
@@ -198,7 +197,7 @@ def registration(
     known = bool(table["added_m"].notna().any())
     column, label = _ADDED if known else _LEAVE_ONE_OUT
     _draw_bars(bars, 1000 * table.set_index("method")[column], label)
-    marks.legend_below(figure, axes[0, 0], ncols=2)
+    marks.legend_below(figure, axes[0, 0])
     what = TEXTS["registration"]["known" if known else "unknown"]
     said = 1000 * table.set_index("method")[column].dropna()
     return Figure(figure, *texts("registration", what=what, note=note, said=said), table)

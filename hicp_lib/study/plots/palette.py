@@ -1,5 +1,8 @@
 """Colours and markers: a fixed pair per detector, on every page."""
 
+import tomllib
+from typing import Any
+
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.files import read_json
 
@@ -13,9 +16,10 @@ DETECTOR_STYLES: dict[str, tuple[str, str]] = {
 } | {PERFECT: (TRUTH_COLOUR, "x")}
 OTHER_COLOUR, _OTHER_MARKER = "#595959", "."
 
-# The two subsets of HiCP and the near one, and the two boxes of the paper's figure of how they are made.
-SUBSET_COLOURS = {"basic": "#0072B2", "headless": "#D55E00", "near": "#009E73"}
-SUBSET_MARKERS = {"basic": "o", "headless": "s", "near": "D"}
+STYLES: dict[str, dict[str, Any]] = tomllib.loads((DATA_DIR / "figure_styles.toml").read_text("utf-8"))
+"""How all else looks, by what it is and its name: options of Matplotlib."""
+
+# The two boxes of the paper's figure of how the subsets are made.
 HEAD_COLOUR = "#D5272D"
 BODY_COLOUR = "#1B9E4B"
 

@@ -79,6 +79,7 @@ def picture_grid(
     row_titles: Sequence[str] = (),
     titles: Sequence[str] = (),
     cell_in: float = 2.2,
+    title_pt: float = 0,
 ) -> Figure:
     """Pictures in rows and columns, each scaled into an equal cell.
 
@@ -89,9 +90,11 @@ def picture_grid(
     caption, alt : str
     row_titles : sequence of str
     titles : sequence of str
-        Of the cells, row by row; as many as there are columns name these.
+        Of the pictures, row by row; as many as there are columns name these.
     cell_in : float
         Width of a cell in inches.
+    title_pt : float
+        Size of all titles; 0 for 9, and less over narrow cells.
 
     Returns
     -------
@@ -109,27 +112,12 @@ def picture_grid(
         axis.spines[:].set_visible(False)
         if j < len(rows[i]) and rows[i][j] is not None:
             axis.imshow(rows[i][j], interpolation="lanczos")
-    for axis, title in zip(axes.flat, titles, strict=False):
-        axis.set_title(in_lines(title), loc="center", fontsize=min(9, 4 * cell_in))
+    named = axes[0] if len(titles) == n_columns else [axis for axis in axes.flat if axis.images]
+    for axis, title in zip(named, titles, strict=bool(titles)):
+        axis.set_title(in_lines(title), loc="center", fontsize=title_pt or min(9, 4 * cell_in), pad=2)
     for axis, title in zip(axes[:, 0], row_titles, strict=False):
-        axis.set_ylabel(title, fontsize=9)
+        axis.set_ylabel(title, fontsize=max(title_pt, 9))
     return Figure(figure, caption, alt)
-
-
-def title_pictures(grid: Figure, titles: Sequence[str], fontsize: float) -> None:
-    """Write a title over each picture of a grid; empty cells have none.
-
-    Parameters
-    ----------
-    grid : Figure
-        As from `picture_grid`.
-    titles : sequence of str
-        Row by row.
-    fontsize : float
-        In points.
-    """
-    for axis, title in zip([axis for axis in grid.figure.axes if axis.images], titles, strict=True):
-        axis.set_title(title, loc="center", fontsize=fontsize, pad=2)
 
 
 @in_style
@@ -155,7 +143,8 @@ def detections_grid(
     columns = len(detectors) if len(pictures) > 1 else min(len(detectors), 2)
     shown = [(image, found[d], d) for image, found in pictures.values() for d in detectors]
     drawn = [draw_detections(*one, min_score) for one in shown]
-    seen = [f"{d} {sum(len(found[d]) > 0 for _, found in pictures.values())}" for d in detectors]
+    n_seen = {d: sum(len(found[d]) > 0 for _, found in pictures.values()) for d in detectors}
+    seen = [f"{d} {n} of {len(pictures)}" for d, n in n_seen.items()]
     said = {"min_score": min_score, "note": note and f" {note}", "pictures": list(pictures), "seen": seen}
     return picture_grid(
         [drawn[start : start + columns] for start in range(0, len(drawn), columns)],

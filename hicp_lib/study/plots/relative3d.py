@@ -14,7 +14,7 @@ from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour, detector_marker
 from hicp_lib.study.plots.people import detections_grid
-from hicp_lib.study.plots.style import COLUMN_IN, Figure, in_style, new_figure, texts
+from hicp_lib.study.plots.style import COLUMN_IN, Figure, in_style, new_figure, series_text, texts
 from hicp_lib.study.table_format import intervals_over
 
 _AXES = ("x_m", "y_m", "z_m")
@@ -94,11 +94,16 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
             axis.set(aspect="equal", xlim=limits[across], ylim=limits[up])
             axis.set(title=direction, xlabel=f"{across[0]} [m]", ylabel=f"{view}, {up[0]} [m]")
             axis.yaxis.set_inverted(up == "x_m")  # forward is up
-    marks.legend_below(figure, axes, ncols=2)
+    marks.legend_below(figure, axes)
     counts = medians.groupby(["detector", "view"], sort=False).size()
-    dashed = "; dashed: the true skeleton" * bool(truth)
-    told = texts("median_skeletons", fewest=fewest, dashed=dashed, note=note, said=counts)
-    return Figure(figure, *told, medians)
+    told = {"fewest": fewest, "dashed": "; dashed: the true skeleton" * bool(truth), "note": note, "off": ""}
+    if truth:
+        true = pd.concat([rows.drop_duplicates("keypoint").assign(view=view) for view, rows in truth.items()])
+        both = medians.merge(true, on=["view", "keypoint"], suffixes=("", "_true"))
+        off_m = np.linalg.norm(both[[*_AXES]] - both[[f"{name}_true" for name in _AXES]].to_numpy(), axis=1)
+        off_cm = (100 * pd.Series(off_m)).groupby(both["detector"], sort=False).median()
+        told["off"] = f" Median distance from the truth: {series_text(off_cm, '{} {:.1f} cm')}."
+    return Figure(figure, *texts("median_skeletons", **told, said=counts), medians)
 
 
 def _draw_skeleton(axis, rows: pd.DataFrame, columns: tuple[str, str], colour, style, label) -> None:
@@ -142,10 +147,12 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
             scale.set_minor_locator(NullLocator())
         axis.axline((1, 1), (2, 2), color="#888888", lw=1, ls="--")
         axis.label_outer()
-    marks.legend_below(figure, axes, ncols=2)
+    marks.legend_below(figure, axes)
     n_bias, n = (rows["bias_m"] > rows["spread_m"]).sum(), len(rows)
     told = {"method": method, "filled": views[0], "intervals": intervals_over(rows), "note": note}
-    return Figure(figure, *texts("spread_against_bias", **told, n_bias=n_bias, n=n), table)
+    biases_cm = 100 * rows.groupby("detector", sort=False)["bias_m"].median()
+    told |= {"n_bias": n_bias, "n": n, "biases": biases_cm}
+    return Figure(figure, *texts("spread_against_bias", **told), table)
 
 
 BODY_LIMBS = [limb for limb in LIMBS if limb[0] not in HANDS]

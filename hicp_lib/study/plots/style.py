@@ -46,22 +46,23 @@ class Figure:
 _NOTHING = "Nothing to draw: these data have nobody and nothing that this figure is about."
 
 
-def in_style(draw: Callable[..., Figure]) -> Callable[..., Figure]:
+def in_style(draw: Callable[..., Figure | None]) -> Callable[..., Figure]:
     """Decorator: run a drawing function in the report's style, leaving Matplotlib's settings as they were.
 
-    An empty table, list or mapping is not drawn: one sentence stands in the figure's place.
+    An empty table, list or mapping is not drawn, nor anything where `draw` returns None: one sentence stands
+    in the figure's place.
     """
 
     @functools.wraps(draw)
     def styled(*args, **kwargs) -> Figure:
         with plt.style.context(_STYLE):
             data = [given for given in args if isinstance(given, pd.DataFrame | list | dict)]
-            if not all(map(len, data)):
-                figure = new_figure(1, 1, 6.0, 0.5, subplot_kw={"visible": False})[0]
-                figure.text(0.5, 0.5, _NOTHING, ha="center", va="center")
-                table = next((given for given in data if isinstance(given, pd.DataFrame)), None)
-                return Figure(figure, _NOTHING, _NOTHING, table)
-            return draw(*args, **kwargs)
+            if all(map(len, data)) and (drawn := draw(*args, **kwargs)):
+                return drawn
+            figure = new_figure(1, 1, 6.0, 0.5, subplot_kw={"visible": False})[0]
+            figure.text(0.5, 0.5, _NOTHING, ha="center", va="center")
+            table = next((given for given in data if isinstance(given, pd.DataFrame)), None)
+            return Figure(figure, _NOTHING, _NOTHING, table)
 
     return styled
 

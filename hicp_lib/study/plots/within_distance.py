@@ -47,7 +47,7 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
     keys = {name: {"color": detector_colour(name), "marker": detector_marker(name)} for name in detectors}
     lines = {f"{name} lifting": {"ls": _METHOD_LINES.get(name, "--")} for name in methods}
     marks.add_keys(axes[0, 0], (), keys | lines)
-    marks.legend_below(figure, axes[0, 0], ncols=3)
+    marks.legend_below(figure, axes[0, 0])
     middle_m = marked_m[len(marked_m) // 2]
     rows = table[np.isclose(table["threshold_m"], middle_m)]
     means = rows.groupby(["detector", "view", "method"], sort=False)["value"].mean()
@@ -74,17 +74,12 @@ def within_dots(table: pd.DataFrame, method: str, note: str) -> Figure:
     limits_m = sorted(set(table["threshold_m"]))
     limit_m = limits_m[len(limits_m) // 2]
     rows = table[(table["threshold_m"] == limit_m) & (table["method"] == method)]
-    parts, pens = list(rows["part"].unique()), marks.detector_dots(rows["detector"].unique())
-    height_in = 0.8 + (0.6 + 0.3 * len(parts)) * rows["view"].nunique()
-    shared = {"sharex": True, "sharey": True}
-    figure, axes, panels = marks.panels(rows, ["view", "reference"], COLUMN_IN, height_in, **shared)
-    for axis, of_panel, view, reference in panels:
-        marks.dots_in_rows(axis, of_panel, "part", "detector", parts, pens)
-        marks.name_rows(axis, parts)
+    pens, by = marks.detector_dots(rows["detector"].unique()), ["view", "reference"]
+    figure, _, panels = marks.dot_chart(rows, "part", "detector", pens, COLUMN_IN, by)
+    for axis, _, view, reference in panels:
         label = f"within {100 * limit_m:g} cm of {TEXTS['references'][reference]}"
         axis.set(title=f"{view} · {TEXTS['aims'][reference]}", xlabel=label, xlim=(-0.04, 1.04))
         axis.label_outer()
-    marks.legend_below(figure, axes, ncols=3)
     means = rows.groupby(["detector", "view", "reference"], sort=False)["value"].mean()
     told = {"method": method, "limit_cm": 100 * limit_m, "intervals": intervals_over(table), "note": note}
     told["ends"] = means.iloc[[means.argmax(), means.argmin()]]

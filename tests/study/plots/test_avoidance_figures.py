@@ -11,8 +11,13 @@ from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.separation import Separation
 from hicp_lib.robot.skin import read_skin
-from hicp_lib.study.plots.avoidance import clearances, separation_terms, sweep_curves
-from hicp_lib.study.plots.avoidance_pictures import filmstrip, nearest_views
+from hicp_lib.study.plots.avoidance import (
+    clearances,
+    filmstrip,
+    nearest_views,
+    separation_terms,
+    sweep_curves,
+)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +56,8 @@ def test_clearances_and_sweeps_are_drawn_over_people():
         [people.assign(latency_s=late_s, min_distance_m=0.05 - late_s / 10) for late_s in (0.0, 0.3)]
     )
     figure = sweep_curves({"latency_s": swept}, "made up")
-    assert "mediapipe, ours, from 5.0 to 2.0 cm over latency_s" in figure.alt
+    assert "mediapipe, ours, from 5.0 to 2.0 cm over latency" in figure.alt
+    assert "Largest fall: mediapipe, ours, from 5.0 to 2.0 cm over latency." in figure.caption
     assert figure.figure.axes[0].get_lines()[0].get_xdata().tolist() == [0, 300]
 
 
@@ -73,3 +79,9 @@ def test_each_detector_shows_the_last_image_before_the_middle_of_the_near_phase(
     assert [[len(axis.images) for axis in row] for row in axes] == [[1, 0], [0, 1]]
     assert axes[0, 0].images[0].get_array().max() == 90 and axes[1, 0].get_ylabel() == "sitting, head"
     assert "sitting, hand and sitting, head" in figure.alt
+    assert "somebody is found: mediapipe 0 and movenet-thunder 0." in figure.caption
+    sure = {"keypoints_px": [120.0, 90.0] * 136, "scores": [0.9] * 136, "keypoints_m": [1.0] * 408}
+    there = [Run(run.job, run.cycles, pd.DataFrame([frames.iloc[0].to_dict() | sure]))] * 2
+    assert "somebody is found: mediapipe 1." in nearest_views(there, "made up").caption, (
+        "the last run is shown"
+    )

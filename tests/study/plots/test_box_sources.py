@@ -7,7 +7,7 @@ import pytest
 from hicp_lib.evaluation.ap.loss_shares import SHARES, box_variants, loss_shares
 from hicp_lib.evaluation.ap.metric_table import draw_cases, metric_table
 from hicp_lib.evaluation.statistics.resampling import Draws
-from hicp_lib.study.plots import box_sources
+from hicp_lib.study.plots import evaluation
 from tests.evaluation.made_people import make_annotations, make_detections
 
 PAIR = ("movenet-lightning", "movenet-multipose")
@@ -35,7 +35,7 @@ def values(axis) -> list[float]:
 
 def test_a_mark_for_each_source_of_the_box_and_place(drawn):
     table = metric_table(drawn)
-    figure = box_sources.box_sources(table, "made-up people")
+    figure = evaluation.box_sources(table, "made-up people")
     (axis,) = figure.figure.axes
     assert "made-up people" in figure.caption and figure.table is table
     rows = table[table["metric"] == "AP"]
@@ -47,8 +47,8 @@ def test_a_mark_for_each_source_of_the_box_and_place(drawn):
 
 def test_a_panel_for_each_share_and_none_for_the_difference_of_two_detectors(drawn):
     table = loss_shares(drawn, *PAIR)
-    figure = box_sources.loss_shares(table, "made-up people")
-    assert [axis.get_title(loc="left") for axis in figure.figure.axes] == [s.capitalize() for s in SHARES]
+    figure = evaluation.loss_shares(table, "made-up people")
+    assert [axis.get_xlabel() for axis in figure.figure.axes] == [f"loss of AP,\n{share}" for share in SHARES]
     shown = table[~table["detector"].str.contains(" less ")]
     for axis, share in zip(figure.figure.axes, SHARES, strict=True):
         assert values(axis) == pytest.approx(sorted(shown.loc[shown["share"] == share, "value"]))

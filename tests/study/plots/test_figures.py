@@ -13,7 +13,7 @@ from hicp_lib.detectors.registry import DETECTORS, default_detector_names
 from hicp_lib.evaluation.ap.found_and_placed import found_and_placed
 from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.study.plots import evaluation, people
-from hicp_lib.study.plots.example import example
+from hicp_lib.study.plots.one_person import example
 from hicp_lib.study.plots.palette import DETECTOR_STYLES, detector_colour
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 from tests.evaluation.made_people import make_annotations

@@ -77,10 +77,20 @@ def test_a_legend_has_each_label_once():
     for axis in axes:
         axis.plot([0, 1], label="mediapipe")
     axes[1].plot([1, 0], label="mmpose")
-    marks.legend_below(figure, axes, ncols=3, fontsize=7)
+    marks.legend_below(figure, axes)
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == ["mediapipe", "mmpose"]
-    assert legend.get_texts()[0].get_fontsize() == 7 and legend._ncols == 3
+
+
+@pytest.mark.parametrize("label", ["a", "mediapipe", "movenet-multipose, lower", "x" * 40])
+def test_a_legend_is_no_wider_than_its_figure(label):
+    figure, axis = new_figure(1, 1, 5.5, 3.0, layout="constrained")
+    for k in range(8):
+        axis.plot([0, 1], label=f"{label} {k}")
+    marks.legend_below(figure, axis)
+    figure.canvas.draw()
+    width_px = figure.legends[0].get_window_extent().width
+    assert width_px <= figure.bbox.width < 3 * width_px
 
 
 def test_lines_of_a_legend_have_the_detectors_colours_and_no_points():

@@ -83,7 +83,9 @@ def test_skeletons_are_drawn_per_view_and_direction_with_the_truth_dashed():
             for detector in DETECTORS
         ]
     )
-    figure = relative3d.median_skeletons(medians, dict.fromkeys(VIEWS, keypoints), "made up")
+    beside = keypoints.assign(x_m=keypoints["x_m"] + 0.03)
+    figure = relative3d.median_skeletons(medians, dict.fromkeys(VIEWS, beside), "made up")
+    assert "Median distance from the truth: mediapipe 3.0 cm and" in figure.caption
     assert len(figure.figure.axes) == 6
     front = figure.figure.axes[0]
     drawn = [line for line in front.get_lines() if len(line.get_xydata())]
@@ -108,6 +110,7 @@ def test_spread_and_bias_are_in_centimetres_and_rare_parts_left_out():
     assert marker.get_color() == DETECTOR_STYLES["mediapipe"][0]
     assert marker.get_marker() == DETECTOR_STYLES["mediapipe"][1]
     assert "1 of 1 marks have more bias" in figure.alt and "lie 1 of 1 marks" in figure.caption
+    assert "Median bias: mediapipe 3.0 cm." in figure.caption
 
 
 def test_camera_views_have_a_row_per_frame_and_view_and_a_column_per_detector(monkeypatch):
@@ -125,7 +128,7 @@ def test_camera_views_have_a_row_per_frame_and_view_and_a_column_per_detector(mo
     assert [int(image[0, 0, 0]) for image in images] == [0, 0, 0, 0, 2, 2, 2, 2]
     drawn = [bool((image != image[0, 0]).any()) for image in images]
     assert drawn == [True, False, False, False, True, False, True, False]
-    assert "mediapipe 3 and posenet 0" in figure.alt and "made up" in figure.caption
+    assert "mediapipe 3 of 4 and posenet 0 of 4" in figure.caption and "made up" in figure.caption
     markers = pd.DataFrame({"frame": [2, 2, 0], "u_px": [20.0, np.nan, 20.0], "v_px": [15.0, np.nan, 900.0]})
     figure = relative3d.camera_views(recordings, people, [0, 2], 0.1, "made up", markers)
     first, *_, last = (axis.images[0].get_array() for axis in figure.figure.axes[1::2])

@@ -6,7 +6,7 @@ import pytest
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import write_png
-from hicp_lib.study.plots.same_person import same_person
+from hicp_lib.study.plots.one_person import same_person
 from tests.evaluation.made_people import make_annotations
 
 LOSSES = {1: 0.9, 2: 0.1, 3: 0.4}  # by image: the third is in the middle
