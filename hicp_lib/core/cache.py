@@ -66,13 +66,14 @@ class _Module:
     data: frozenset[str]
 
 
-def key(entry_points: Sequence[Callable], *, without: Sequence[str] = (), **inputs: Any) -> str:
+def key(entry_points: Sequence[Callable | str], *, without: Sequence[str] = (), **inputs: Any) -> str:
     """SHA-256 of everything a result depends on.
 
     Parameters
     ----------
-    entry_points : sequence of callable
-        What makes the result. All code that their modules import, directly or indirectly, is part of the key.
+    entry_points : sequence of callable or str
+        What makes the result, or its module's name. All code that the modules import, directly or indirectly,
+        is part of the key.
     without : sequence of str
         Names of modules to leave out: their effect on the result is described by `inputs`.
     **inputs : any
@@ -90,7 +91,7 @@ def key(entry_points: Sequence[Callable], *, without: Sequence[str] = (), **inpu
     >>> one == key([sha256_bytes], n_frames=3), one == key([sha256_bytes], n_frames=4)
     (True, False)
     """
-    names = sorted({entry.__module__ for entry in entry_points})
+    names = sorted({entry if isinstance(entry, str) else entry.__module__ for entry in entry_points})
     return digest([asdict(running_code(tuple(names), tuple(without))), content(inputs)])
 
 
