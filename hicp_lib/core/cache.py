@@ -72,8 +72,8 @@ def key(entry_points: Sequence[Callable | str], *, without: Sequence[str] = (), 
     Parameters
     ----------
     entry_points : sequence of callable or str
-        What makes the result, functions or names of modules. All code that their modules import, directly or
-        indirectly, is part of the key.
+        What makes the result, or its module's name. All code that the modules import, directly or indirectly,
+        is part of the key.
     without : sequence of str
         Names of modules to leave out: their effect on the result is described by `inputs`.
     **inputs : any

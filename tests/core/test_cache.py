@@ -225,6 +225,7 @@ def test_inputs_and_entry_points_are_in_the_key(tmp_path):
         key([code], n=second),
     ]
     assert len(set(keys)) == len(keys)
+    assert key([code.__module__]) == key([code])  # a module's name, and what is in it
     with pytest.raises(TypeError, match="the content of object is not known"):
         key([code], n=object())
 
