@@ -96,7 +96,8 @@ study.value("texts", texts)"""
     parameters = f"seed = 0\nscale = 1.5\ndetectors = {list(SCRIPTS)!r}\nimages = {SCRIPTS[0]!r}"
     write_notebook(study / "notebooks" / "00_first.ipynb", START, cell, FINISH, parameters=parameters)
     home = study / "book" / "index.md"
-    shown = '{{ value("00_first", "text") }}\n\n{{ table("00_first", "t") }}\n'
+    shown = '{{ value("00_first", "text") }}\n\n{{ rows("00_first", "t")[0] | join(", ") }}\n\n'
+    shown += '{% for row in rows("00_first", "t") %}\n{{ row.values() | join(", ") }}\n\n{% endfor %}\n'
     home.write_text(f"# Home\n\n{shown}\nAll: {{{{ raw('00_first', 'texts') | join(', ') }}}}\n")
     page = make_report("quick", [], print, sources=study, root=study)
     for name in ("index.html", "notebooks/00_first.html"):

@@ -98,7 +98,8 @@ def test_names_of_the_data_are_text_on_every_page(study):
     write_page(
         study,
         '{{ value("00_first", "name") }} {{ raw("00_first", "names") | join(", ") }}\n\n'
-        '{{ table("00_first", "names") }}\n\n- {{ raw("00_first", "names")[0] }}\n',
+        '{% for row in rows("00_first", "names") %}\n{{ row | join }}\n\n{{ row.values() | join }}\n\n'
+        '{% endfor %}\n- {{ raw("00_first", "names")[0] }}\n',
     )
     images = str(study / "a" / hostile.replace("/", ""))
     page = make_report("quick", [("images", images)], print, sources=study, root=study)
