@@ -34,13 +34,14 @@ def finish_page(page: BeautifulSoup, path: Path, book: Path) -> None:
     book : Path
     """
     # The theme loads the search on every page, and a megabyte for a dozen icons, which become drawings.
-    unused = "fontawesome" + ("" if path.name == "search.html" else "|searchindex|searchtools|language_data")
+    searches = path.name == "search.html"  # its scripts use those before them
+    unused = "fontawesome" + ("" if searches else "|searchindex|searchtools|language_data")
     unused += "" if page.find(class_=re.compile("^sd-")) else "|sphinx-design"
     for tag in page.find_all(["script", "link"]):
         address = str(tag.get("src") or tag.get("href"))
         if re.search(unused, address) or tag.get("rel") == ["preload"]:
             tag.decompose()
-        elif _CAN_WAIT.search(address):
+        elif not searches and _CAN_WAIT.search(address):
             tag["defer"] = ""
     for icon in page.find_all("i", class_=re.compile("^fa-")):
         _draw(icon, book / "_static" / "scripts" / "fontawesome.js")
