@@ -12,6 +12,7 @@ from hicp_lib.cli import main as cli
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import write_png
 from hicp_lib.core.video import open_video
+from hicp_lib.detectors import registry
 from hicp_lib.detectors.runtime import run
 from hicp_lib.detectors.runtime.to_file import detect_to_file, open_dataset, open_pictures
 from tests.core.test_video import write_video
@@ -21,7 +22,8 @@ from tests.detectors.runtime.test_run import Counting
 @pytest.fixture(autouse=True)
 def counting(monkeypatch, tmp_path):
     monkeypatch.setenv("HICP_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(run, "make_detector", lambda name, **options: Counting(**options))
+    for module in (registry, run):
+        monkeypatch.setattr(module, "make_detector", lambda name, **options: Counting(**options))
     Counting.calls = 0
 
 
