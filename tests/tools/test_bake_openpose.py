@@ -13,7 +13,7 @@ import pytest
 from bake import source_package
 
 from hicp_lib.core.files import sha256_bytes
-from hicp_lib.detectors.openpose import mobilenet
+from hicp_lib.detectors.openpose.networks import OpenPoseMobileNet
 from hicp_lib.detectors.weights import default
 from tests.tools.test_frozen_graph import Graph
 
@@ -43,7 +43,7 @@ def test_two_bakes_give_the_same_bytes_and_say_what_they_are_from():
 
 
 def test_the_committed_file_says_what_it_was_made_from():
-    model = onnx.load_from_string(default.load(f"{mobilenet.OpenPoseMobileNet.name}.onnx"))
+    model = onnx.load_from_string(default.load(f"{OpenPoseMobileNet.name}.onnx"))
     about = {entry.key: entry.value for entry in model.metadata_props}
     assert about["source_sha256"] == bake_openpose.GRAPH_SHA256
     assert about["licence"] == bake_openpose.LICENCE
