@@ -157,8 +157,9 @@ def lift(folder: Path, detector: str, method: str, out: Path, workers: int | str
     refuse_other_suffix(out, (".parquet", ".csv"))
     recording = open_recording(folder)
     options = given(**chosen)
-    make_detector(detector, **options)  # refuses what is none of its options
+    made = make_detector(detector, **options)  # refuses what is none of its options
     found = detect_images(detector, dict(enumerate(recording.rgb_paths)), workers, **options)
+    del made  # until here, since the runs share its open network
     table = lift_recording(recording, list(detections_of(found).values()), method)
     write_table(out, table)
     n_lifted = table["x_m"].notna().sum()

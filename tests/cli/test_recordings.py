@@ -79,3 +79,14 @@ def test_lift_needs_a_recording(capsys, tmp_path):
     arguments = ["lift", "--recording", str(tmp_path), "--detector", "mediapipe", "--out", "k.parquet"]
     assert cli.run(arguments) == 2
     assert "camera.json: cannot be read" in capsys.readouterr().err
+
+
+def test_lift_opens_a_network_once(small, tmp_path, monkeypatch):
+    from hicp_lib.detectors.onnx import session
+
+    monkeypatch.setenv("HICP_CACHE", str(tmp_path / "cache"))
+    opened, start = [], session.start
+    monkeypatch.setattr(session, "start", lambda path, *rest: opened.append(path) or start(path, *rest))
+    arguments = ["lift", "--recording", str(small), "--detector", "posenet", "--workers", "1"]
+    assert cli.run([*arguments, "--out", str(tmp_path / "k.parquet")]) == 0
+    assert len(opened) == 1
