@@ -30,13 +30,8 @@ from hicp_lib.evaluation.ap import cocoeval
 from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals
 from hicp_lib.evaluation.ap.evaluate import evaluate
 from hicp_lib.evaluation.statistics.resampling import Draws
-from hicp_lib.formats.annotations import (
-    Annotations,
-    ImageInfo,
-    read_annotations,
-    write_annotations,
-    write_detections,
-)
+from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
+from hicp_lib.formats.detections import write_detections
 
 N_FOUND = 3  # detections per image
 

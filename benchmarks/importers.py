@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 from timing import Comparison, best_seconds, run
 
-from hicp_lib.formats.annotations import Annotations, ImageInfo, write_detections
+from hicp_lib.formats.annotations import Annotations, ImageInfo
+from hicp_lib.formats.detections import write_detections
 from hicp_lib.formats.importers.importing import import_predictions
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))

@@ -20,7 +20,8 @@ def calibration() -> None:
 def calibration_fit(annotations: Path, detections: Path, detector: str, out: Path) -> None:
     """Fit hit rates to scores, on images not used for evaluation later."""
     from hicp_lib.evaluation.calibration.files import fit_calibrations, write_calibrations
-    from hicp_lib.formats.annotations import read_annotations, read_detections
+    from hicp_lib.formats.annotations import read_annotations
+    from hicp_lib.formats.detections import read_detections
 
     people = read_annotations(annotations)
     table, counts = fit_calibrations(people, read_detections(detections, people), detector)

@@ -39,7 +39,8 @@ def draw(
     detections: Path, images: Path, annotations: Path | None, out: Path, limit: int, min_score: float
 ) -> None:
     """Draw detections over their images, worst first: an HTML page, or PNG files."""
-    from hicp_lib.formats.annotations import read_annotations, read_detections
+    from hicp_lib.formats.annotations import read_annotations
+    from hicp_lib.formats.detections import read_detections
     from hicp_lib.inspection.gallery import image_paths, pictures, write_page, write_pngs
 
     if out.suffix not in ("", ".html"):

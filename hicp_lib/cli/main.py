@@ -239,7 +239,8 @@ def import_(
     kind: str, predictions: Path, annotations: Path, keypoint_map, out: Path, score_scale, as_json: bool
 ) -> None:
     """Read the predictions another tool wrote."""
-    from hicp_lib.formats.annotations import read_annotations, write_detections
+    from hicp_lib.formats.annotations import read_annotations
+    from hicp_lib.formats.detections import write_detections
     from hicp_lib.formats.importers.importing import import_predictions, summary_lines
 
     imported = import_predictions(kind, predictions, read_annotations(annotations, keypoint_map), score_scale)
@@ -256,7 +257,8 @@ def import_(
 @click.option("--out", type=PATH, required=True)
 def export(detections: Path, kind: str, layout: str, annotations: Path | None, out: Path) -> None:
     """Write detections for other tools."""
-    from hicp_lib.formats.annotations import read_annotations, read_detections
+    from hicp_lib.formats.annotations import read_annotations
+    from hicp_lib.formats.detections import read_detections
     from hicp_lib.formats.exporters import export_detections
 
     people = None if annotations is None else read_annotations(annotations)
@@ -286,8 +288,9 @@ def evaluate(
     """
     from hicp_lib.core.keypoints import GROUPS
     from hicp_lib.evaluation.ap import judgement
-    from hicp_lib.formats.annotations import detections_in_parts, read_annotations
+    from hicp_lib.formats.annotations import read_annotations
     from hicp_lib.formats.detection_files import refuse_other_suffix
+    from hicp_lib.formats.detections import detections_in_parts
 
     if out is not None:
         refuse_other_suffix(out)

@@ -7,7 +7,8 @@ from pathlib import Path
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.folders import listed
-from hicp_lib.formats.annotations import Annotations, read_detections
+from hicp_lib.formats.annotations import Annotations
+from hicp_lib.formats.detections import read_detections
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,39}")
 

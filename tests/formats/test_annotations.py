@@ -14,13 +14,8 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX, TO_HALPE
 from hicp_lib.datasets.subsets import SUBSETS, crop_annotations, plan
 from hicp_lib.evaluation.ap.evaluate import evaluate
-from hicp_lib.formats.annotations import (
-    Annotations,
-    read_annotations,
-    read_detections,
-    write_annotations,
-    write_detections,
-)
+from hicp_lib.formats.annotations import Annotations, read_annotations, write_annotations
+from hicp_lib.formats.detections import read_detections, write_detections
 
 
 def keypoints(n: int, x: float = 100.0, v: float = 2) -> list[float]:

@@ -11,7 +11,8 @@ from pycocotools.coco import COCO
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES, TO_HALPE
-from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, read_detections
+from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations
+from hicp_lib.formats.detections import read_detections
 from hicp_lib.formats.exporters import LAYOUTS, export_detections
 
 

@@ -7,7 +7,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.ap.metric_table import compare
 from hicp_lib.evaluation.cases import groups_of
 from hicp_lib.evaluation.statistics.resampling import Draws
-from hicp_lib.formats.annotations import write_detections
+from hicp_lib.formats.detections import write_detections
 from hicp_lib.formats.imported import read_imported
 from tests.evaluation.made_people import make_annotations, make_detections
 

@@ -10,7 +10,8 @@ import pytest
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import COCO_NAMES, HAND_NAMES, INDEX, NAMES, TO_HALPE
-from hicp_lib.formats.annotations import read_annotations, read_detections
+from hicp_lib.formats.annotations import read_annotations
+from hicp_lib.formats.detections import read_detections
 from hicp_lib.formats.layouts import halpe_name, layouts_of
 
 FINGERS = "thumb forefinger middle_finger ring_finger pinky_finger".split()

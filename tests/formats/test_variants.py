@@ -10,7 +10,8 @@ import pytest
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import COCO_NAMES
 from hicp_lib.evaluation.ap.evaluate import evaluate
-from hicp_lib.formats.annotations import read_annotations, read_detections
+from hicp_lib.formats.annotations import read_annotations
+from hicp_lib.formats.detections import read_detections
 
 SIZES = [(640, 480), (480, 640), (800, 600)]
 SPELLINGS = [str, str.title, lambda n: n.replace("_", " "),

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.formats.annotations import write_detections
 from hicp_lib.formats.detection_files import open_detections
+from hicp_lib.formats.detections import write_detections
 from tests.formats.importers.native_people import make_person
 from tests.inspection.cases import case, dump
 

@@ -11,7 +11,8 @@ from hicp_lib.cli.main import run
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import read_image, write_png
-from hicp_lib.formats.annotations import ImageInfo, write_annotations, write_detections
+from hicp_lib.formats.annotations import ImageInfo, write_annotations
+from hicp_lib.formats.detections import write_detections
 from hicp_lib.inspection.gallery import MAX_SIDE_PX, image_paths, pictures, write_page, write_pngs
 from tests.evaluation.made_people import make_annotations
 

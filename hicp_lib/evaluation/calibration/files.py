@@ -17,7 +17,8 @@ from hicp_lib.core.keypoints import GROUPS
 from hicp_lib.core.tables import read_table
 from hicp_lib.evaluation.calibration.curves import Calibration, calibration_table, calibrations_of
 from hicp_lib.evaluation.calibration.keypoint_hits import keypoint_hits
-from hicp_lib.formats.annotations import Annotations, read_detections, write_detections
+from hicp_lib.formats.annotations import Annotations
+from hicp_lib.formats.detections import read_detections, write_detections
 
 RAW_SCORES = "raw_keypoint_scores"
 _ROUNDING = 1e-12  # by which a rate may decrease
@@ -139,7 +140,7 @@ def apply_calibrations(
     Raises
     ------
     InputError
-        As `hicp_lib.formats.annotations.read_detections`.
+        As `hicp_lib.formats.detections.read_detections`.
     """
     found = read_detections(detections_path)
     extras: dict[int, list[dict]] = {image_id: [] for image_id in found}

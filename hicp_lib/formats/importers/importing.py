@@ -2,7 +2,7 @@
 
 The `read_*` function of each format returns people and the names of their images; here they are matched with
 the annotated images, scores are scaled to [0, 1], and the matching is summarised.
-`hicp_lib.formats.annotations.write_detections` writes the detections with the tool's own scores and keys
+`hicp_lib.formats.detections.write_detections` writes the detections with the tool's own scores and keys
 (`Imported.extras`) beside them.
 """
 

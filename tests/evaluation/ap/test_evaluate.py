@@ -10,7 +10,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import HANDS, SIGMAS
 from hicp_lib.evaluation.ap.evaluate import Evaluator, evaluate, in_parts
 from hicp_lib.evaluation.ap.person_oks import person_oks
-from hicp_lib.formats.annotations import read_detections, write_detections
+from hicp_lib.formats.detections import read_detections, write_detections
 
 RNG = np.random.default_rng(1)
 PERSON = RNG.uniform(100, 300, (136, 2))

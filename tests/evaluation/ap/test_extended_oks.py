@@ -12,8 +12,9 @@ from hicp_lib.core.keypoints import COCO_17, SIGMAS
 from hicp_lib.evaluation.ap.evaluate import evaluate
 from hicp_lib.evaluation.ap.extended_oks import extended_oks, known_flags
 from hicp_lib.evaluation.ap.options import definitions
-from hicp_lib.formats.annotations import read_annotations, read_detections
+from hicp_lib.formats.annotations import read_annotations
 from hicp_lib.formats.cropcoco import OUTSIDE
+from hicp_lib.formats.detections import read_detections
 from tests.evaluation.ap.cropped_people import NUMBERS, SEEDS, cropped_people
 from tests.evaluation.made_people import make_annotations, make_detections
 

@@ -9,7 +9,7 @@ from hicp_lib.core.keypoints import GROUPS, N_KEYPOINTS
 from hicp_lib.evaluation.ap.evaluate import in_parts
 from hicp_lib.evaluation.ap.judgement import judge
 from hicp_lib.formats import number_lists
-from hicp_lib.formats.annotations import detections_in_parts, write_detections
+from hicp_lib.formats.detections import detections_in_parts, write_detections
 from tests.evaluation.made_people import make_annotations, make_detections
 
 N_FOUND = 3

@@ -9,7 +9,7 @@ import pytest
 from hicp_lib.cli import main as cli
 from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.calibration.files import apply_calibrations, read_calibrations
-from hicp_lib.formats.annotations import read_detections
+from hicp_lib.formats.detections import read_detections
 
 N = 40
 

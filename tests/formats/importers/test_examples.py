@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from hicp_lib.evaluation.ap.evaluate import evaluate
-from hicp_lib.formats.annotations import read_annotations, read_detections, write_detections
+from hicp_lib.formats.annotations import read_annotations
+from hicp_lib.formats.detections import read_detections, write_detections
 from hicp_lib.formats.importers.importing import READERS, import_predictions
 
 ROOT = Path(__file__).parents[3]

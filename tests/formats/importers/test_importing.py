@@ -18,7 +18,7 @@ from native_files import (
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.evaluation.ap.evaluate import check_detections
-from hicp_lib.formats.annotations import read_detections, write_detections
+from hicp_lib.formats.detections import read_detections, write_detections
 from hicp_lib.formats.importers.importing import import_predictions, summary_lines
 from tests.formats.importers.native_people import NAMES, annotated, make_person
 

@@ -18,8 +18,8 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.formats import exporters
-from hicp_lib.formats.annotations import write_detections
 from hicp_lib.formats.detection_files import SUFFIXES
+from hicp_lib.formats.detections import write_detections
 from hicp_lib.formats.importers.importing import READERS, import_predictions, summary_lines
 from tests.formats.importers.native_people import NAMES, annotated, make_person
 
