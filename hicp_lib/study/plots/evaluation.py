@@ -124,8 +124,10 @@ def _by_subset(rows: pd.DataFrame, labels: dict[str, str], across: str, xlim=(-0
     figure, axes, panels = marks.panels(rows, ["group", across], WIDTH_IN, height_in, **shared)
     for axis, part, group, what in panels:
         _dots_by_subset(axis, part, names[group])
-        axis.set(xlim=xlim, xlabel=labels[what])
+        axis.set(xlabel=labels[what])
         axis.label_outer()
+    if xlim:  # else the limits follow from the marks of all panels
+        axes[0, 0].set(xlim=xlim)
     for axis, group in zip(axes[:, 0], groups, strict=True):
         axis.set_title(GROUP_TITLES.get(group, group))
     marks.legend_below(figure, axes)

@@ -53,3 +53,13 @@ def test_a_panel_for_each_share_and_none_for_the_difference_of_two_detectors(dra
     for axis, share in zip(figure.figure.axes, SHARES, strict=True):
         assert values(axis) == pytest.approx(sorted(shown.loc[shown["share"] == share, "value"]))
     assert isinstance(figure.table, pd.DataFrame) and " less " not in figure.alt
+
+
+def test_no_share_is_cut_off_whatever_stands_in_the_panel_before(drawn):
+    table = loss_shares(drawn, *PAIR)
+    last = table["share"] == SHARES[-1]
+    table.loc[last, ["value", "low", "high"]] = table.loc[last, ["value", "low", "high"]] - 2
+    figure = evaluation.loss_shares(table, "made-up people")
+    for axis in figure.figure.axes:
+        low, high = axis.get_xlim()
+        assert all(low < value < high for value in values(axis))
