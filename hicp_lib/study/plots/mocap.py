@@ -55,9 +55,10 @@ def joint_medians(medians: pd.DataFrame, paper: pd.DataFrame, min_score: float, 
             if (detector, method) == (PERFECT, "paper"):
                 axis.axvline(100 * dot["median_m"].iloc[0], color=TRUTH_COLOUR, lw=0.8, ls=":")
         axis.axhline(n_ours - 0.5, color="#AAAAAA", lw=0.8)
-        axis.set(xlabel="median distance [cm]", title=joint, xlim=(0, None))
+        axis.set(xlabel="median distance [cm]", title=joint)
         marks.name_rows(axis, names)
         axis.label_outer()
+    axes[0, 0].set(xlim=(0, None))  # of all, and not before all are drawn: it ends the scaling to the marks
     fills = {"the paper's lifting": {}, "robust lifting": {"mfc": "white"}}
     marks.add_keys(axes[0, 0], (), {name: {"marker": "o", "ls": ""} | fill for name, fill in fills.items()})
     marks.legend_below(figure, axes[0, 0])

@@ -78,6 +78,12 @@ def test_medians_stand_above_the_papers_like_with_like(medians):
     assert "true keypoints" not in draw.joint_medians(others, paper_medians(), 0.1, "made up").caption
 
 
+def test_medians_are_within_the_limits_whichever_joint_has_the_largest(medians):
+    medians.loc[medians["keypoint"] == TABLE_JOINTS[-1], ["median_m", "low_m", "high_m"]] *= 10
+    panels = draw.joint_medians(medians, paper_medians(), 0.1, "made up").figure.axes
+    assert all(line.get_xdata()[0] < axis.get_xlim()[1] for axis in panels for line, *_ in axis.containers)
+
+
 def test_residuals_are_lifted_less_captured_and_have_gaps(errors):
     figure = draw.residuals(errors, TIMES_S, "right_wrist", 0.1, "made up")
     x, y, _ = figure.figure.axes
