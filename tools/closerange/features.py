@@ -1,0 +1,64 @@
+"""The frozen layers' outputs for all squares, computed once, in 16 bits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+
+from hicp_lib.core.files import sha256_bytes, sha256_file
+
+from .frozen import SHAPES, frozen_layers
+
+
+def load_truth(folder: Path) -> dict[str, np.ndarray]:
+    """`keypoints_px` (n, 136, 2), `seen` (n, 136), `identity` (n,) of all squares, in the files' order."""
+    parts = [np.load(path) for path in _files(folder)]
+    return {
+        name: np.concatenate([part[name] for part in parts]) for name in ("keypoints_px", "seen", "identity")
+    }
+
+
+def load_features(folder: Path, lightning: Path, threads: int) -> dict[str, np.ndarray]:
+    """Memory-mapped features by name, shape (n, channels, side, side), dtype float16; made if not there.
+
+    Made anew if a file of squares or the frozen network is another.
+    """
+    prefix = frozen_layers(lightning).SerializeToString()
+    stamp = sha256_bytes(prefix + squares_sha256(folder).encode())
+    made = folder / "features" / "stamp.txt"
+    n = len(load_truth(folder)["seen"])
+    shapes = {name: (n, *of) for name, of in SHAPES.items()}
+    places = {name: folder / "features" / f"{name}.f16" for name in SHAPES}
+    if not made.exists() or made.read_text() != stamp:
+        made.parent.mkdir(exist_ok=True)
+        made.unlink(missing_ok=True)
+        maps = {name: np.memmap(places[name], np.float16, "w+", shape=shapes[name]) for name in SHAPES}
+        _fill(folder, prefix, maps, threads)
+        made.write_text(stamp)
+    return {name: np.memmap(places[name], np.float16, "r", shape=shapes[name]) for name in SHAPES}
+
+
+def squares_sha256(folder: Path) -> str:
+    """Hash of all files of squares."""
+    return sha256_bytes("".join(f"{path.name} {sha256_file(path)}\n" for path in _files(folder)).encode())
+
+
+def _fill(folder: Path, prefix: bytes, maps: dict[str, np.ndarray], threads: int) -> None:
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    session = onnxruntime.InferenceSession(prefix, options, providers=["CPUExecutionProvider"])
+    row = 0
+    for path in _files(folder):
+        squares = np.load(path)["squares"]
+        if not len(squares):
+            continue
+        image = np.ascontiguousarray(squares.transpose(0, 3, 1, 2), np.float32)
+        for name, values in zip(maps, session.run(list(maps), {"image": image}), strict=True):
+            maps[name][row : row + len(squares)] = values
+        row += len(squares)
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted((folder / "samples").glob("*.npz"))
