@@ -8,6 +8,7 @@ its map near that position, and the probabilities that it is in the picture and 
 Hands are small in such a square, so the same network looks at each of them again, in a square of its own.
 """
 
+from pathlib import Path
 from typing import Any, Unpack
 
 import cv2
@@ -18,7 +19,7 @@ from hicp_lib.core.keypoints import COCO_17
 from hicp_lib.detectors.combined.hand_squares import HAND_POINTS
 from hicp_lib.detectors.onnx.box_source import BoxOptions, BoxSource
 from hicp_lib.detectors.onnx.fitting import Regions
-from hicp_lib.detectors.onnx.session import open_committed
+from hicp_lib.detectors.onnx.session import open_committed, open_model
 
 _PRESENT = 0.5
 _HAND_SIDE = 2.0  # of a hand's square, in extents of its points; those trained on are 1.3 to 3
@@ -30,6 +31,8 @@ class CloseRange:
 
     Parameters
     ----------
+    model : str or Path, optional
+        Another file that `tools/closerange/export.py` wrote.
     padding : float
         Factor by which boxes are enlarged before they become squares.
     look_again : bool
@@ -41,10 +44,12 @@ class CloseRange:
     name = "closerange"
 
     def __init__(
-        self, padding: float = 1.0, look_again: bool = True, **person_boxes: Unpack[BoxOptions]
-    ) -> None:
+        self, model: str | Path | None = None, padding: float = 1.0, look_again: bool = True,
+        **person_boxes: Unpack[BoxOptions],
+    ) -> None:  # fmt: skip
         self._boxes = BoxSource(**person_boxes)
-        self._model = open_committed(f"{self.name}.onnx", **self._boxes.run)
+        run = self._boxes.run
+        self._model = open_model(model, **run) if model else open_committed(f"{self.name}.onnx", **run)
         self._padding, self._looks_again = padding, look_again
         self.takes_boxes = self._boxes.kind == "gt"
         self.settings: dict[str, Any] = {"padding": padding, "look_again": look_again}

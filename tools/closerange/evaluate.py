@@ -1,0 +1,96 @@
+"""Evaluate networks for close range, and what they are held against, on rendered people.
+
+    python tools/closerange/evaluate.py NAME=MODEL.onnx [...] --out TABLES [--development N]
+                                        [--no-look]
+
+By default on the held-out people of the full study: Basic, Headless and Near. `--development N`: on N scenes
+of development identities (seed 900003) that nothing was trained on, to choose by. Writes TABLES/metrics.csv
+(average precision of bodies, hands and single hands), TABLES/extended.csv (by extended OKS) and
+TABLES/differences.csv (every network less every other detector).
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from hicp_lib.core.files import cache_dir
+from hicp_lib.datasets.subsets import create_hicp
+from hicp_lib.detectors.runtime.results import detections_of
+from hicp_lib.detectors.runtime.run import time_dataset
+from hicp_lib.evaluation.ap import metric_table
+from hicp_lib.evaluation.failures.presence import extended_table
+from hicp_lib.evaluation.statistics.resampling import Draws
+from hicp_lib.formats.annotations import read_annotations
+from hicp_lib.simulation.world.scenes import render_dataset
+from hicp_lib.study.sources import open_near, open_source
+
+DEVELOPMENT_SEED, MIN_PIXELS = 900_003, 20_000
+OTHERS = (
+    "movenet-lightning", "movenet-thunder", "mediapipe",
+    "combined:movenet-thunder+mediapipe-hands", "combined:mediapipe-pose+mediapipe-hands",
+)  # fmt: skip
+"""What networks are held against; of the combinations with all looks (notebook 02b)."""
+_ALL_LOOKS = {"looks": "wrists+mirrored+image+along"}
+
+
+def held_out() -> tuple[dict[str, Path], Path]:
+    """Folders of the full study's data sets, and the annotations of the whole images."""
+    data = open_source()
+    near = open_near(data, 96, 0, MIN_PIXELS)
+    return data.subsets | {"near": near.basic}, data.annotations
+
+
+def development(n_scenes: int) -> tuple[dict[str, Path], Path]:
+    """As `held_out`, of development identities."""
+    folder = cache_dir() / f"closerange_development_{n_scenes}"
+    render_dataset(folder / "scenes", n_scenes, DEVELOPMENT_SEED, split="development")
+    annotations = folder / "scenes" / "annotations.json"
+    create_hicp(annotations, folder / "scenes" / "images", folder / "hicp", MIN_PIXELS)
+    return {subset: folder / "hicp" / subset for subset in ("basic", "headless")}, annotations
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("models", nargs="+", help="NAME=FILE.onnx")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--development", type=int, default=0, metavar="N")
+    parser.add_argument("--no-look", action="store_true", help="also without a second look at hands")
+    arguments = parser.parse_args()
+    folders, whole = development(arguments.development) if arguments.development else held_out()
+    truth = {subset: read_annotations(folder / "annotations.json") for subset, folder in folders.items()}
+    found = {}
+    for subset, folder in folders.items():
+        for name in OTHERS:
+            options = _ALL_LOOKS if name.startswith("combined:") else {}
+            found[subset, name] = detections_of(time_dataset(name, folder, **options))
+        for name, model in (given.split("=", 1) for given in arguments.models):
+            looks = {f"closerange, {name}": True}
+            looks |= {f"closerange, {name}, one look": False} if arguments.no_look else {}
+            for label, look in looks.items():
+                run = time_dataset("closerange", folder, model=model, look_again=look)
+                found[subset, label] = detections_of(run)
+    draws = Draws(1000, 0)
+    drawn = metric_table.draw_cases(truth, found, draws, metric_table.GROUPS_OF_OBJECTS)
+    metrics, pairs = metric_table.metric_table(drawn), metric_table.pairs(drawn)
+    # Near is cut from other images.
+    subsets = [subset for subset in folders if subset != "near"]
+    of_whole = {case: run for case, run in found.items() if case[0] in subsets}
+    bodies = {case: of for case, of in drawn.items() if case[0] in subsets and case[2] == "body"}
+    source = read_annotations(whole)
+    extended = extended_table({subset: truth[subset] for subset in subsets}, of_whole, source, bodies, draws)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    ours = pairs["detector"].str.startswith("closerange") & (pairs["metric"] == "AP")
+    for name, table in (("metrics", metrics), ("differences", pairs[ours]), ("extended", extended)):
+        table.to_csv(arguments.out / f"{name}.csv", index=False, float_format="%.4f", lineterminator="\n")
+    ap = metrics[metrics["metric"] == "AP"]
+    print(ap.pivot_table(index=["group", "detector"], columns="subset", values="value").round(3).to_string())
+    print(
+        extended.pivot_table(index="detector", columns=["subset", "measure"], values="value")
+        .round(3)
+        .to_string()
+    )
+
+
+if __name__ == "__main__":
+    main()
