@@ -1,18 +1,25 @@
 """Evaluate networks for close range, and what they are held against, on rendered people.
 
     python tools/closerange/evaluate.py NAME=MODEL.onnx [...] --out TABLES [--development N]
-                                        [--no-look]
+                                        [--photographs CHECKOUT] [--no-look]
 
 By default on the held-out people of the full study: Basic, Headless and Near. `--development N`: on N scenes
-of development identities (seed 900003) that nothing was trained on, to choose by. Writes TABLES/metrics.csv
-(average precision of bodies, hands and single hands), TABLES/extended.csv (by extended OKS) and
-TABLES/differences.csv (every network less every other detector).
+of development identities (seed 900003), to choose by. `--photographs CHECKOUT`: on the photographs of
+`tools/photographs.py`, where only bodies are judged. Writes TABLES/metrics.csv (average precision of bodies,
+hands and single hands), TABLES/differences.csv (every network less every other detector) and
+TABLES/extended.csv (by extended OKS).
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
+import tempfile
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from photographs import make_subsets  # noqa: E402
 
 from hicp_lib.core.files import cache_dir
 from hicp_lib.datasets.subsets import create_hicp
@@ -26,8 +33,9 @@ from hicp_lib.simulation.world.scenes import render_dataset
 from hicp_lib.study.sources import open_near, open_source
 
 DEVELOPMENT_SEED, MIN_PIXELS = 900_003, 20_000
+BODIES = ("movenet-lightning", "movenet-thunder")
 OTHERS = (
-    "movenet-lightning", "movenet-thunder", "mediapipe",
+    *BODIES, "mediapipe",
     "combined:movenet-thunder+mediapipe-hands", "combined:mediapipe-pose+mediapipe-hands",
 )  # fmt: skip
 """What networks are held against; of the combinations with all looks (notebook 02b)."""
@@ -50,46 +58,61 @@ def development(n_scenes: int) -> tuple[dict[str, Path], Path]:
     return {subset: folder / "hicp" / subset for subset in ("basic", "headless")}, annotations
 
 
+def detect(folders: dict[str, Path], others: tuple, models: dict[str, str], no_look: bool) -> dict:
+    """Detections by subset and detector, then by image."""
+    found = {}
+    for subset, folder in folders.items():
+        for name in others:
+            options = _ALL_LOOKS if name.startswith("combined:") else {}
+            found[subset, name] = detections_of(time_dataset(name, folder, **options))
+        for name, model in models.items():
+            looks = {f"closerange, {name}": True}
+            if no_look:
+                looks[f"closerange, {name}, one look"] = False
+            for label, look in looks.items():
+                run = time_dataset("closerange", folder, model=model, look_again=look)
+                found[subset, label] = detections_of(run)
+    return found
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("models", nargs="+", help="NAME=FILE.onnx")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--development", type=int, default=0, metavar="N")
     parser.add_argument("--no-look", action="store_true", help="also without a second look at hands")
+    parser.add_argument("--photographs", type=Path, metavar="CHECKOUT")
     arguments = parser.parse_args()
-    folders, whole = development(arguments.development) if arguments.development else held_out()
-    truth = {subset: read_annotations(folder / "annotations.json") for subset, folder in folders.items()}
-    found = {}
-    for subset, folder in folders.items():
-        for name in OTHERS:
-            options = _ALL_LOOKS if name.startswith("combined:") else {}
-            found[subset, name] = detections_of(time_dataset(name, folder, **options))
-        for name, model in (given.split("=", 1) for given in arguments.models):
-            looks = {f"closerange, {name}": True}
-            looks |= {f"closerange, {name}, one look": False} if arguments.no_look else {}
-            for label, look in looks.items():
-                run = time_dataset("closerange", folder, model=model, look_again=look)
-                found[subset, label] = detections_of(run)
+    models = dict(given.split("=", 1) for given in arguments.models)
+    groups, others = metric_table.GROUPS_OF_OBJECTS, OTHERS
+    with tempfile.TemporaryDirectory() as place:
+        if arguments.photographs:
+            folders, whole = make_subsets(arguments.photographs, Path(place))[0], None
+            groups, others = ("body",), BODIES
+        else:
+            folders, whole = development(arguments.development) if arguments.development else held_out()
+        truth = {subset: read_annotations(folder / "annotations.json") for subset, folder in folders.items()}
+        found = detect(folders, others, models, arguments.no_look)
     draws = Draws(1000, 0)
-    drawn = metric_table.draw_cases(truth, found, draws, metric_table.GROUPS_OF_OBJECTS)
+    drawn = metric_table.draw_cases(truth, found, draws, groups)
     metrics, pairs = metric_table.metric_table(drawn), metric_table.pairs(drawn)
-    # Near is cut from other images.
-    subsets = [subset for subset in folders if subset != "near"]
-    of_whole = {case: run for case, run in found.items() if case[0] in subsets}
-    bodies = {case: of for case, of in drawn.items() if case[0] in subsets and case[2] == "body"}
-    source = read_annotations(whole)
-    extended = extended_table({subset: truth[subset] for subset in subsets}, of_whole, source, bodies, draws)
-    arguments.out.mkdir(parents=True, exist_ok=True)
     ours = pairs["detector"].str.startswith("closerange") & (pairs["metric"] == "AP")
-    for name, table in (("metrics", metrics), ("differences", pairs[ours]), ("extended", extended)):
+    tables = {"metrics": metrics, "differences": pairs[ours]}
+    if whole:
+        # Near is cut from other images.
+        kept = [subset for subset in folders if subset != "near"]
+        of_whole = {case: run for case, run in found.items() if case[0] in kept}
+        bodies = {case: of for case, of in drawn.items() if case[0] in kept and case[2] == "body"}
+        known = {subset: truth[subset] for subset in kept}
+        tables["extended"] = extended_table(known, of_whole, read_annotations(whole), bodies, draws)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    for name, table in tables.items():
         table.to_csv(arguments.out / f"{name}.csv", index=False, float_format="%.4f", lineterminator="\n")
     ap = metrics[metrics["metric"] == "AP"]
     print(ap.pivot_table(index=["group", "detector"], columns="subset", values="value").round(3).to_string())
-    print(
-        extended.pivot_table(index="detector", columns=["subset", "measure"], values="value")
-        .round(3)
-        .to_string()
-    )
+    for table in [of for name, of in tables.items() if name == "extended"]:
+        rows = table.pivot_table(index="detector", columns=["subset", "measure"], values="value")
+        print(rows.round(3).to_string())
 
 
 if __name__ == "__main__":
