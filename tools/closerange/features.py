@@ -11,13 +11,13 @@ from hicp_lib.core.files import sha256_bytes, sha256_file
 
 from .frozen import SHAPES, frozen_layers
 
+TRUTH = ("keypoints_px", "seen", "body", "picture", "view")
+
 
 def load_truth(folder: Path) -> dict[str, np.ndarray]:
-    """`keypoints_px` (n, 136, 2), `seen` (n, 136), `identity` (n,) of all squares, in the files' order."""
+    """`keypoints_px` (n, 136, 2), `seen` (n, 136), `body`, `picture`, `view` (n,) of all squares."""
     parts = [np.load(path) for path in _files(folder)]
-    return {
-        name: np.concatenate([part[name] for part in parts]) for name in ("keypoints_px", "seen", "identity")
-    }
+    return {name: np.concatenate([part[name] for part in parts]) for name in TRUTH}
 
 
 def load_features(folder: Path, lightning: Path, threads: int) -> dict[str, np.ndarray]:
@@ -52,12 +52,10 @@ def _fill(folder: Path, prefix: bytes, maps: dict[str, np.ndarray], threads: int
     row = 0
     for path in _files(folder):
         squares = np.load(path)["squares"]
-        if not len(squares):
-            continue
-        image = np.ascontiguousarray(squares.transpose(0, 3, 1, 2), np.float32)
-        for name, values in zip(maps, session.run(list(maps), {"image": image}), strict=True):
-            maps[name][row : row + len(squares)] = values
-        row += len(squares)
+        for image in squares.transpose(0, 3, 1, 2).astype(np.float32):
+            for name, values in zip(maps, session.run(list(maps), {"image": image[None]}), strict=True):
+                maps[name][row] = values[0]
+            row += 1
 
 
 def _files(folder: Path) -> list[Path]:

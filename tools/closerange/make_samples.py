@@ -55,14 +55,16 @@ def draw_image(
             drawn = (draw_sample(rng, image, points, visibility, patches) for _ in range(_TRIES))
             sample = next((s for s in drawn if s is not None), None)
             if sample is not None:
-                found.append((sample, people.extras[row].get("identity", "")))
+                found.append((sample, people.extras[row]["identity"]["body"]))
     with atomic_path(out) as path, path.open("wb") as file:
         np.savez(
             file,
             squares=np.array([s.square for s, _ in found], np.uint8).reshape(-1, SIDE_PX, SIDE_PX, 3),
             keypoints_px=np.array([s.keypoints_px for s, _ in found], np.float32).reshape(-1, 136, 2),
             seen=np.array([s.seen for s, _ in found], np.uint8).reshape(-1, 136),
-            identity=np.array([str(i) for _, i in found]),
+            body=np.array([body for _, body in found], "U40"),
+            picture=np.full(len(found), out.stem.rpartition("_")[0], "U40"),
+            view=np.array([s.view for s, _ in found], "U20"),
         )
 
 

@@ -2,9 +2,9 @@
 
 MoveNet's layers stay as they are, for photographs' sake: onnxruntime runs them, and what the decoder needs
 of them is kept, so that training runs the rest only. These are features at a quarter, an eighth and a
-sixteenth of the input's resolution, and its own maps of 17 body points, as logits. MoveNet's coarsest layers
-are there twice: frozen, for these maps, and as the beginning of what is trained. The decoder adds up four
-resolutions and gives per keypoint a map of logits at a quarter of the input's resolution, for body points
+sixteenth of the input's resolution, and its own maps of 17 body points, as logarithms. MoveNet's
+coarsest layers are there twice: frozen, for these maps, and as the beginning of what is trained. The decoder
+adds up four resolutions and gives per keypoint a map of logits at a quarter of the input's, for body points
 added to MoveNet's, and the logits of two questions: is the keypoint in the picture, and is it visible?
 """
 
@@ -114,7 +114,7 @@ class CloseRange(nn.Module):
             "quarter": nn.Sequential(_separable(width, width), _separable(width, width)),
         })  # fmt: skip
         self.maps = nn.Conv2d(width, N_KEYPOINTS, 1)
-        self.body_gain = nn.Parameter(torch.ones(N_BODY, 1, 1))
+        self.body_gain = nn.Parameter(torch.full((N_BODY, 1, 1), 1.5))
         self.pooled = nn.Sequential(nn.Linear(wide + width, 256), nn.ReLU(), nn.Linear(256, 2 * N_KEYPOINTS))
         self.peak = nn.Parameter(torch.tensor([[0.5, 0.2], [0.5, 0.2]])[..., None].repeat(1, 1, N_KEYPOINTS))
 

@@ -36,11 +36,14 @@ class Sample:
         In the square, pixel centres at integers; NaN where not in it.
     seen : array, shape (136,), dtype uint8
         0 not in the square, 1 hidden, 2 visible.
+    view : str
+        Of `VIEWS`.
     """
 
     square: np.ndarray
     keypoints_px: np.ndarray
     seen: np.ndarray
+    view: str
 
 
 def draw_sample(
@@ -85,7 +88,7 @@ def draw_sample(
     if rng.random() < 0.35:
         seen = _occlude(rng, square, points, seen, fillers)
     square = _photographed(rng, square)
-    return Sample(square, np.where(seen[:, None] > 0, points, np.nan).astype(np.float32), seen)
+    return Sample(square, np.where(seen[:, None] > 0, points, np.nan).astype(np.float32), seen, view)
 
 
 def _view(

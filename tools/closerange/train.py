@@ -1,11 +1,11 @@
 """Train the network for close range on the squares of `make_samples.py`.
 
-    python tools/closerange/train.py FOLDER OUT [--epochs 8] [--seed 0] [--threads 2] [--share 1]
-                                     [--tail-rate .1]
+    python tools/closerange/train.py FOLDER OUT [--steps 8000] [--seed 0] [--threads 2] [--tail-rate .1]
+                                     [--share 1] [--views whole+headless+part+hand]
 
-Writes OUT/state.pt after each epoch, from which a stopped training goes on; OUT/curve.csv, losses and errors
-per epoch; OUT/configuration.json with all numbers and the data's hash. The same seed, data, and number of
-threads give the same network. Some development identities are held back to see when to stop.
+Writes, every 500 steps, OUT/state.pt, from which a stopped training goes on, and OUT/curve.csv, losses and
+errors; OUT/configuration.json with all numbers and the data's hash. The same seed, data, and number of
+threads give the same network. Some development bodies are held back, on which the errors are measured.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import json
 import math
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -27,11 +28,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from closerange.features import load_features, load_truth, squares_sha256  # noqa: E402
 from closerange.frozen import GRID, SIDE_PX, STRIDE  # noqa: E402
 from closerange.network import CloseRange, Decoded  # noqa: E402
+from closerange.samples import VIEWS  # noqa: E402
 from hicp_lib.core.keypoints import BODY, COCO_17, FACE, HANDS, SIGMAS  # noqa: E402
 
 LIGHTNING = Path(__file__).parents[2] / "data" / "weights" / "movenet-lightning.onnx"
 HELD_BACK = 4
-"""Development identities, the last of their sorted names, that only tell when to stop."""
+"""Development bodies, the last of their sorted names, that are not trained on."""
+CHECK_STEPS, N_CHECKED = 500, 1500
 BATCH, RATE, DECAY, WARM_UP = 32, 2e-3, 1e-4, 100
 SIGMA_CELLS = 1.0
 HIDDEN_WEIGHT, BODY_WEIGHT, FACE_WEIGHT, ANSWER_WEIGHT = 0.3, 2.0, 0.2, 2.0
@@ -85,84 +88,95 @@ def _batch(features: dict[str, np.ndarray], rows: np.ndarray) -> list[torch.Tens
     return [torch.from_numpy(np.asarray(of[np.sort(rows)], np.float32)) for of in features.values()]
 
 
-def train(
-    folder: Path, out: Path, epochs: int, seed: int, threads: int, width: int, share: float, tail_rate: float
-) -> None:
-    torch.manual_seed(seed)
-    torch.set_num_threads(threads)
-    torch.use_deterministic_algorithms(True)
-    out.mkdir(parents=True, exist_ok=True)
-    truth, features = load_truth(folder), load_features(folder, LIGHTNING, threads)
-    names = sorted(set(truth["identity"]))
-    back = np.isin(truth["identity"], names[-HELD_BACK:])
-    training, checking = np.flatnonzero(~back), np.flatnonzero(back)
-    training = training[: int(share * len(training))]
-    network = CloseRange(LIGHTNING, width)
-    network.tail.requires_grad_(tail_rate > 0)
+def batches(rows: np.ndarray, seed: int, first: int, last: int) -> Iterator[np.ndarray]:
+    """The rows of each step from `first`: all rows, in another order each time."""
+    per_epoch = len(rows) // BATCH
+    for k in range(first, last):
+        epoch, place = divmod(k, per_epoch)
+        if k == first or place == 0:
+            order = np.random.default_rng([seed, epoch]).permutation(rows)
+        yield np.sort(order[place * BATCH : (place + 1) * BATCH])
+
+
+def chosen_rows(truth: dict[str, np.ndarray], views: str, share: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rows to train on, of a share of the pictures, and some rows of the bodies that are held back."""
+    bodies, pictures = sorted(set(truth["body"])), sorted(set(truth["picture"]))
+    back = np.isin(truth["body"], bodies[-HELD_BACK:])
+    used = np.random.default_rng(0).permutation(pictures)[: round(share * len(pictures))]
+    chosen = ~back & np.isin(truth["view"], views.split("+")) & np.isin(truth["picture"], used)
+    checking = np.flatnonzero(back)
+    return np.flatnonzero(chosen), checking[:: max(1, len(checking) // N_CHECKED)]
+
+
+def start(options: argparse.Namespace) -> tuple[CloseRange, dict]:
+    """The network, and all that is stored of a training."""
+    network = CloseRange(LIGHTNING, options.width)
+    network.tail.requires_grad_(options.tail_rate > 0)
     average = torch.optim.swa_utils.AveragedModel(
         network, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(AVERAGE), use_buffers=True
     )
-    tail, rest = (
-        list(network.tail.parameters()),
-        [of for n, of in network.named_parameters() if n[:5] != "tail."],
-    )
-    groups = [{"params": rest, "lr": RATE}, {"params": tail, "lr": RATE * tail_rate}]
-    optimizer = torch.optim.AdamW(groups, RATE, weight_decay=DECAY)
-    steps = epochs * (len(training) // BATCH)
+    rest = [parameter for name, parameter in network.named_parameters() if not name.startswith("tail.")]
+    tail = {"params": list(network.tail.parameters()), "lr": RATE * options.tail_rate}
+    optimizer = torch.optim.AdamW([{"params": rest}, tail], RATE, weight_decay=DECAY)
     schedule = torch.optim.lr_scheduler.LambdaLR(
-        optimizer, lambda k: min(1, (k + 1) / WARM_UP) * 0.5 * (1 + math.cos(math.pi * min(1, k / steps)))
+        optimizer,
+        lambda k: min(1, (k + 1) / WARM_UP) * (1 + math.cos(math.pi * min(1, k / options.steps))) / 2,
     )
-    configuration = {
-        "epochs": epochs, "seed": seed, "threads": threads, "width": width, "batch": BATCH, "rate": RATE,
-        "decay": DECAY, "hidden_weight": HIDDEN_WEIGHT, "face_weight": FACE_WEIGHT, "share": share,
-        "answer_weight": ANSWER_WEIGHT, "n_training": len(training), "n_checking": len(checking),
-        "held_back": names[-HELD_BACK:], "tail_rate": tail_rate, "body_weight": BODY_WEIGHT,
-        "squares_sha256": squares_sha256(folder), "torch": torch.__version__,
+    return network, {"network": network, "average": average, "optimizer": optimizer, "schedule": schedule}
+
+
+def train(options: argparse.Namespace) -> None:
+    torch.manual_seed(options.seed)
+    torch.set_num_threads(options.threads)
+    torch.use_deterministic_algorithms(True)
+    folder, out = options.folder, options.out
+    out.mkdir(parents=True, exist_ok=True)
+    truth, features = load_truth(folder), load_features(folder, LIGHTNING, options.threads)
+    training, checking = chosen_rows(truth, options.views, options.share)
+    network, parts = start(options)
+    numbers = {name: value for name, value in vars(options).items() if name not in ("folder", "out")} | {
+        "batch": BATCH, "rate": RATE, "decay": DECAY, "average": AVERAGE, "hidden_weight": HIDDEN_WEIGHT,
+        "body_weight": BODY_WEIGHT, "face_weight": FACE_WEIGHT, "answer_weight": ANSWER_WEIGHT,
+        "n_training": len(training), "n_checking": len(checking), "squares_sha256": squares_sha256(folder),
+        "held_back": sorted(set(truth["body"][checking])), "torch": torch.__version__,
     }  # fmt: skip
-    (out / "configuration.json").write_text(json.dumps(configuration, indent=1) + "\n")
-    start, curve = 0, []
+    (out / "configuration.json").write_text(json.dumps(numbers, indent=1) + "\n")
+    done, curve = 0, []
     if (out / "state.pt").exists():
         state = torch.load(out / "state.pt", weights_only=True)
-        for of, name in (
-            (network, "network"),
-            (average, "average"),
-            (optimizer, "optimizer"),
-            (schedule, "schedule"),
-        ):
-            of.load_state_dict(state[name])
-        start, curve = state["epoch"], pd.read_csv(out / "curve.csv").to_dict("records")
-    for epoch in range(start, epochs):
-        order = np.random.default_rng([seed, epoch]).permutation(training)
-        sums, began = np.zeros(2), time.perf_counter()
+        for name, part in parts.items():
+            part.load_state_dict(state[name])
+        done, curve = state["step"], pd.read_csv(out / "curve.csv").to_dict("records")
+    sums, began = [], time.perf_counter()
+    for step, rows in enumerate(batches(training, options.seed, done, options.steps), done + 1):
         network.train()
-        for k in range(len(order) // BATCH):
-            rows = np.sort(order[k * BATCH : (k + 1) * BATCH])
-            points, seen = (torch.from_numpy(truth[name][rows]) for name in ("keypoints_px", "seen"))
-            optimizer.zero_grad()
-            parts = losses(network, _batch(features, rows), points, seen)
-            (parts[0] + ANSWER_WEIGHT * parts[1]).backward()
-            torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
-            optimizer.step()
-            schedule.step()
-            average.update_parameters(network)
-            sums += [float(part) for part in parts]
-        at = {"epoch": epoch + 1, "loss_position": sums[0] / (k + 1), "loss_answers": sums[1] / (k + 1)}
-        curve.append(at | errors(average.module, features, truth, checking))
-        print(
-            f"{time.perf_counter() - began:.0f} s", {k: round(v, 3) for k, v in curve[-1].items()}, flush=True
-        )
+        points, seen = (torch.from_numpy(truth[name][rows]) for name in ("keypoints_px", "seen"))
+        parts["optimizer"].zero_grad()
+        wrong, answered = losses(network, _batch(features, rows), points, seen)
+        (wrong + ANSWER_WEIGHT * answered).backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
+        parts["optimizer"].step()
+        parts["schedule"].step()
+        parts["average"].update_parameters(network)
+        sums.append((wrong.item(), answered.item()))
+        if step % CHECK_STEPS and step != options.steps:
+            continue
+        at = {"step": step} | dict(zip(("loss_position", "loss_answers"), np.mean(sums, axis=0), strict=True))
+        curve.append(at | errors(parts["average"].module, features, truth, checking))
+        said = {name: round(float(value), 3) for name, value in curve[-1].items()}
+        print(f"{time.perf_counter() - began:.0f} s", said, flush=True)
         pd.DataFrame(curve).to_csv(out / "curve.csv", index=False, lineterminator="\n", float_format="%.5f")
-        parts = {"network": network, "average": average, "optimizer": optimizer, "schedule": schedule}
-        torch.save(
-            {name: of.state_dict() for name, of in parts.items()} | {"epoch": epoch + 1}, out / "state.pt"
-        )
+        state = {name: part.state_dict() for name, part in parts.items()} | {"step": step}
+        torch.save(state, out / "state.part")
+        (out / "state.part").replace(out / "state.pt")
+        sums = []
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--epochs", type=int, default=8)
+    parser.add_argument("--steps", type=int, default=8000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--width", type=int, default=96)
@@ -170,7 +184,8 @@ def main() -> None:
         "--tail-rate", type=float, default=0.1, help="of MoveNet's layers, as part of the rest's"
     )
     parser.add_argument("--share", type=float, default=1.0, help="of the squares, for the learning curve")
-    train(**vars(parser.parse_args()))
+    parser.add_argument("--views", default="+".join(VIEWS), help="kinds of squares, joined by +")
+    train(parser.parse_args())
 
 
 if __name__ == "__main__":
