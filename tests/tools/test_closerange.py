@@ -9,6 +9,7 @@ import pytest
 from closerange import samples
 from closerange.frozen import FROZEN, GRID, LEAST, SIDE_PX, frozen_layers
 from closerange.make_samples import jobs
+from closerange.rows import HELD_BACK, batches, chosen_rows
 
 from hicp_lib.core.keypoints import HEAD, INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 
@@ -35,7 +36,7 @@ def marked(monkeypatch):
 
 def drawn(marked, n, **fixed):
     rng = np.random.default_rng(5)
-    fillers = [np.full((300, 300, 3), 7, np.uint8)]
+    fillers = [lambda: np.full((300, 300, 3), 7, np.uint8)]
     found = (samples.draw_sample(rng, *marked, fillers) for _ in range(n))
     return [sample for sample in found if sample is not None]
 
@@ -112,3 +113,26 @@ def test_only_what_is_not_there_yet_is_drawn(tmp_path, monkeypatch):
     squares = np.load(tmp_path / "samples" / first[0][0])
     assert squares["squares"].shape[1:] == (SIDE_PX, SIDE_PX, 3) and len(squares["squares"])
     assert squares["seen"][:, [*LEFT_HAND, *RIGHT_HAND, INDEX["neck"]]].shape[1] == 43
+
+
+def test_a_stopped_training_goes_on_with_the_same_batches():
+    rows = np.arange(100, 177)
+    whole = list(batches(rows, 8, 3, 0, 25))
+    stopped = [*batches(rows, 8, 3, 0, 11), *batches(rows, 8, 3, 11, 25)]
+    assert len(whole) == 25 and all((a == b).all() for a, b in zip(whole, stopped, strict=True))
+    first = np.concatenate(whole[:9])
+    assert len(set(first)) == 72 and set(first) <= set(rows), "each once before any comes again"
+    assert (whole[0] != next(batches(rows, 8, 4, 0, 1))).any()
+
+
+def test_held_back_bodies_are_not_trained_on():
+    rng = np.random.default_rng(1)
+    truth = {"body": rng.choice([f"b{k:02d}" for k in range(12)], 3000)}
+    truth |= {"picture": rng.choice([f"p{k}" for k in range(200)], 3000)}
+    truth |= {"view": rng.choice(["whole", "hand"], 3000)}
+    training, checking = chosen_rows(truth, "whole+hand", 1.0)
+    assert len(set(truth["body"][checking])) == HELD_BACK
+    assert not set(truth["body"][training]) & set(truth["body"][checking])
+    few, same = chosen_rows(truth, "hand", 0.25)
+    assert set(truth["view"][few]) == {"hand"} and len(set(truth["picture"][few])) == 50
+    assert (same == checking).all(), "all are judged on the same squares"

@@ -46,7 +46,7 @@ def draw_image(
     """Write the squares of one picture's people, as `out/<set>_<image>_<round>.npz`."""
     name = people.images[image_id].file_name
     image = read_image(images / name)
-    patches = [read_image(images / filler) for filler in fillers]
+    patches = [partial(read_image, images / filler) for filler in fillers]
     rng = np.random.default_rng([seed, image_id, round_])
     found = []
     for row in np.flatnonzero((people.image_ids == image_id) & ~people.is_crowd):

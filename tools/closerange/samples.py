@@ -7,6 +7,7 @@ random, since rendered pictures have less variety than photographs.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -48,7 +49,7 @@ class Sample:
 
 def draw_sample(
     rng: np.random.Generator, image: np.ndarray, keypoints_px: np.ndarray, visibility: np.ndarray,
-    fillers: list[np.ndarray],
+    fillers: list[Callable[[], np.ndarray]],
 ) -> Sample | None:  # fmt: skip
     """A random square of a person.
 
@@ -60,8 +61,8 @@ def draw_sample(
     keypoints_px : array, shape (136, 2)
     visibility : array, shape (136,)
         As of `hicp_lib.formats.annotations.Annotations`.
-    fillers : list of array
-        Pictures whose parts serve as occluders.
+    fillers : list of callable
+        Give pictures whose parts serve as occluders.
 
     Returns
     -------
@@ -163,12 +164,12 @@ def _warped(
 
 def _occlude(
     rng: np.random.Generator, square: np.ndarray, points: np.ndarray, seen: np.ndarray,
-    fillers: list[np.ndarray],
+    fillers: list[Callable[[], np.ndarray]],
 ) -> np.ndarray:  # fmt: skip
     """Paste one or two patches of another picture; what they cover is hidden."""
     seen = seen.copy()
     for _ in range(rng.integers(1, 3)):
-        filler = fillers[rng.integers(len(fillers))]
+        filler = fillers[rng.integers(len(fillers))]()
         width, height = (rng.uniform(0.08, 0.35, 2) * SIDE_PX).astype(int)
         height, width = min(height, filler.shape[0] - 1), min(width, filler.shape[1] - 1)
         y, x = rng.integers(filler.shape[0] - height), rng.integers(filler.shape[1] - width)

@@ -15,7 +15,6 @@ import json
 import math
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,13 +27,12 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from closerange.features import load_features, load_truth, squares_sha256  # noqa: E402
 from closerange.frozen import GRID, SIDE_PX, STRIDE  # noqa: E402
 from closerange.network import CloseRange, Decoded  # noqa: E402
+from closerange.rows import batches, chosen_rows  # noqa: E402
 from closerange.samples import VIEWS  # noqa: E402
 from hicp_lib.core.keypoints import BODY, COCO_17, FACE, HANDS, SIGMAS  # noqa: E402
 
 LIGHTNING = Path(__file__).parents[2] / "data" / "weights" / "movenet-lightning.onnx"
-HELD_BACK = 4
-"""Development bodies, the last of their sorted names, that are not trained on."""
-CHECK_STEPS, N_CHECKED = 500, 1500
+CHECK_STEPS = 500
 BATCH, RATE, DECAY, WARM_UP = 32, 2e-3, 1e-4, 100
 SIGMA_CELLS = 1.0
 HIDDEN_WEIGHT, BODY_WEIGHT, FACE_WEIGHT, ANSWER_WEIGHT = 0.3, 2.0, 0.2, 2.0
@@ -85,32 +83,13 @@ def errors(network: CloseRange, features: dict, truth: dict, rows: np.ndarray) -
 
 
 def _batch(features: dict[str, np.ndarray], rows: np.ndarray) -> list[torch.Tensor]:
-    return [torch.from_numpy(np.asarray(of[np.sort(rows)], np.float32)) for of in features.values()]
-
-
-def batches(rows: np.ndarray, seed: int, first: int, last: int) -> Iterator[np.ndarray]:
-    """The rows of each step from `first`: all rows, in another order each time."""
-    per_epoch = len(rows) // BATCH
-    for k in range(first, last):
-        epoch, place = divmod(k, per_epoch)
-        if k == first or place == 0:
-            order = np.random.default_rng([seed, epoch]).permutation(rows)
-        yield np.sort(order[place * BATCH : (place + 1) * BATCH])
-
-
-def chosen_rows(truth: dict[str, np.ndarray], views: str, share: float) -> tuple[np.ndarray, np.ndarray]:
-    """Rows to train on, of a share of the pictures, and some rows of the bodies that are held back."""
-    bodies, pictures = sorted(set(truth["body"])), sorted(set(truth["picture"]))
-    back = np.isin(truth["body"], bodies[-HELD_BACK:])
-    used = np.random.default_rng(0).permutation(pictures)[: round(share * len(pictures))]
-    chosen = ~back & np.isin(truth["view"], views.split("+")) & np.isin(truth["picture"], used)
-    checking = np.flatnonzero(back)
-    return np.flatnonzero(chosen), checking[:: max(1, len(checking) // N_CHECKED)]
+    chosen = (torch.from_numpy(np.asarray(of[np.sort(rows)], np.float32)) for of in features.values())
+    return [of.to(memory_format=torch.channels_last) for of in chosen]  # half the time
 
 
 def start(options: argparse.Namespace) -> tuple[CloseRange, dict]:
     """The network, and all that is stored of a training."""
-    network = CloseRange(LIGHTNING, options.width)
+    network = CloseRange(LIGHTNING, options.width).to(memory_format=torch.channels_last)
     network.tail.requires_grad_(options.tail_rate > 0)
     average = torch.optim.swa_utils.AveragedModel(
         network, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(AVERAGE), use_buffers=True
@@ -148,7 +127,7 @@ def train(options: argparse.Namespace) -> None:
             part.load_state_dict(state[name])
         done, curve = state["step"], pd.read_csv(out / "curve.csv").to_dict("records")
     sums, began = [], time.perf_counter()
-    for step, rows in enumerate(batches(training, options.seed, done, options.steps), done + 1):
+    for step, rows in enumerate(batches(training, BATCH, options.seed, done, options.steps), done + 1):
         network.train()
         points, seen = (torch.from_numpy(truth[name][rows]) for name in ("keypoints_px", "seen"))
         parts["optimizer"].zero_grad()
