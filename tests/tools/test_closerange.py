@@ -34,10 +34,10 @@ def marked(monkeypatch):
     return image, points, np.full(N_KEYPOINTS, 2)
 
 
-def drawn(marked, n, **fixed):
+def drawn(marked, n, of_hand=False):
     rng = np.random.default_rng(5)
     fillers = [lambda: np.full((300, 300, 3), 7, np.uint8)]
-    found = (samples.draw_sample(rng, *marked, fillers) for _ in range(n))
+    found = (samples.draw_sample(rng, *marked, fillers, of_hand) for _ in range(n))
     return [sample for sample in found if sample is not None]
 
 
@@ -84,9 +84,19 @@ def test_views_without_a_head_show_none(marked, monkeypatch):
         assert (rows > 0).sum() <= 12  # of the row of the grid that the border goes through
 
 
+def test_hands_are_right_ones(marked):
+    hands = drawn(marked, 40, of_hand=True)
+    assert len(hands) > 20
+    for sample in hands:
+        there = sample.seen[RIGHT_HAND] > 0
+        assert there.mean() > 0.7
+        middle = np.nanmean(sample.keypoints_px[RIGHT_HAND], axis=0)
+        assert np.abs(middle - SIDE_PX / 2).max() < 0.3 * SIDE_PX
+
+
 def test_the_frozen_layers_are_movenets_own():
     lightning = ROOT / "data" / "weights" / "movenet-lightning.onnx"
-    session = onnxruntime.InferenceSession(frozen_layers(lightning).SerializeToString())
+    session = onnxruntime.InferenceSession(frozen_layers(lightning, list(FROZEN)).SerializeToString())
     image = np.random.default_rng(0).integers(0, 256, (1, 3, SIDE_PX, SIDE_PX)).astype(np.float32)
     model = onnx.load(lightning)
     model.graph.output.extend(onnx.ValueInfoProto(name=name) for name in FROZEN.values())
@@ -102,15 +112,15 @@ def test_only_what_is_not_there_yet_is_drawn(tmp_path, monkeypatch):
     from hicp_lib.simulation.world.scenes import render_dataset
 
     render_dataset(tmp_path / "scenes", 1, 900_001, 1, split="development")
-    (tmp_path / "samples").mkdir()
-    first = list(jobs(tmp_path, "scenes", 2))
+    (tmp_path / "people").mkdir()
+    first = list(jobs(tmp_path, "people", "scenes", 2))
     assert [name for name, _ in first] == ["scenes_000000_0.npz", "scenes_000000_1.npz"]
     first[0][1]()
-    made = (tmp_path / "samples" / first[0][0]).read_bytes()
-    assert [name for name, _ in jobs(tmp_path, "scenes", 2)] == ["scenes_000000_1.npz"]
+    made = (tmp_path / "people" / first[0][0]).read_bytes()
+    assert [name for name, _ in jobs(tmp_path, "people", "scenes", 2)] == ["scenes_000000_1.npz"]
     first[0][1]()
-    assert (tmp_path / "samples" / first[0][0]).read_bytes() == made
-    squares = np.load(tmp_path / "samples" / first[0][0])
+    assert (tmp_path / "people" / first[0][0]).read_bytes() == made
+    squares = np.load(tmp_path / "people" / first[0][0])
     assert squares["squares"].shape[1:] == (SIDE_PX, SIDE_PX, 3) and len(squares["squares"])
     assert squares["seen"][:, [*LEFT_HAND, *RIGHT_HAND, INDEX["neck"]]].shape[1] == 43
 

@@ -32,14 +32,12 @@ def drawn(square: np.ndarray, points: np.ndarray, seen: np.ndarray) -> np.ndarra
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("folder", type=Path)
-    wanted = {view: [] for view in VIEWS}
-    for path in sorted((parser.parse_args().folder / "samples").glob("*_0.npz"))[::7]:
+    folder, wanted = parser.parse_args().folder, {view: [] for view in VIEWS}
+    for path in [path for of in ("people", "hands") for path in sorted((folder / of).glob("*_0.npz"))[::7]]:
         part = np.load(path)
         for k, view in enumerate(part["view"][:1]):
             if len(wanted[view]) < PER_VIEW:
                 wanted[view].append(drawn(part["squares"][k], part["keypoints_px"][k], part["seen"][k]))
-        if all(len(of) == PER_VIEW for of in wanted.values()):
-            break
     gap = ((0, GAP_PX), (0, GAP_PX), (0, 0))
     rows = [[np.pad(square, gap, constant_values=255) for square in of] for of in wanted.values()]
     picture = np.concatenate([np.concatenate(row, axis=1) for row in rows])[:-GAP_PX, :-GAP_PX]

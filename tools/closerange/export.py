@@ -1,11 +1,11 @@
-"""Write the trained network as data/weights/closerange.onnx, and compare it with PyTorch.
+"""Write a trained network into data/weights, and compare it with PyTorch.
 
     python tools/closerange/export.py OUT [--to data/weights/closerange.onnx]
 
 One file: MoveNet's frozen layers and what was trained (the running mean of its weights), with weights in 16
-bits. Input `image`, RGB in 0 to 255, shape (1, 3, 192, 192); output `keypoints`, shape (1, 136, 5): x and y
-in pixels of the square, share of the map near that position, and the probabilities that the keypoint is in
-the picture and that it is visible.
+bits. Input `image`, RGB in 0 to 255, shape (1, 3, 192, 192); output `keypoints`, shape (1, 136, 5), or of a
+hand (1, 21, 5): x and y in pixels of the square, share of the map near that position, and the probabilities
+that the keypoint is in the picture and that it is visible.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from onnx import compose, helper, numpy_helper
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from closerange.frozen import FROZEN, SHAPES, SIDE_PX, frozen_layers  # noqa: E402
+from closerange.frozen import SHAPES, SIDE_PX, frozen_layers, inputs_of  # noqa: E402
 from closerange.network import CloseRange, Decoded  # noqa: E402
 from closerange.train import LIGHTNING  # noqa: E402
 from hicp_lib.core.files import write_bytes  # noqa: E402
@@ -34,31 +34,31 @@ MAX_DIFFERENCE_PX, N_CHECKED = 0.5, 8
 _SMALL = 64  # weights with fewer numbers keep 32 bits
 
 
-def trained(out: Path) -> CloseRange:
-    """The network of a finished training."""
-    width = json.loads((out / "configuration.json").read_text())["width"]
-    network = CloseRange(LIGHTNING, width)
+def trained(out: Path) -> tuple[CloseRange, list[str]]:
+    """The network of a finished training, and what it reads of MoveNet."""
+    options = json.loads((out / "configuration.json").read_text())
+    network = CloseRange(LIGHTNING, options["squares"], options["width"])
     average = torch.load(out / "state.pt", weights_only=True)["average"]
     state = {name.removeprefix("module."): v for name, v in average.items() if name != "n_averaged"}
     network.load_state_dict(state)
-    return network.eval()
+    return network.eval(), inputs_of(options["squares"])
 
 
-def exported(network: CloseRange) -> onnx.ModelProto:
+def exported(network: CloseRange, names: list[str]) -> onnx.ModelProto:
     """The whole network as ONNX."""
-    example = tuple(torch.zeros(1, *SHAPES[name]) for name in FROZEN)
+    example = tuple(torch.zeros(1, *SHAPES[name]) for name in names)
     buffer = io.BytesIO()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         torch.onnx.export(
-            Decoded(network).eval(), example, buffer, input_names=list(FROZEN), output_names=["keypoints"],
+            Decoded(network).eval(), example, buffer, input_names=names, output_names=["keypoints"],
             opset_version=17, dynamo=False,
         )  # fmt: skip
     head = onnx.load_from_string(buffer.getvalue())
-    prefix = onnx.version_converter.convert_version(frozen_layers(LIGHTNING), 17)
+    prefix = onnx.version_converter.convert_version(frozen_layers(LIGHTNING, names), 17)
     prefix.ir_version = head.ir_version
     joined = compose.merge_models(compose.add_prefix(prefix, "f_", rename_inputs=False, rename_outputs=False),
-                                  head, io_map=[(name, name) for name in FROZEN])  # fmt: skip
+                                  head, io_map=[(name, name) for name in names])  # fmt: skip
     joined.graph.input[0].type.tensor_type.shape.dim[0].dim_value = 1
     return in_16_bits(joined)
 
@@ -89,14 +89,14 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--to", type=Path, default=LIGHTNING.with_name("closerange.onnx"))
     arguments = parser.parse_args()
-    network = trained(arguments.out)
-    model = exported(network).SerializeToString()
+    network, names = trained(arguments.out)
+    model = exported(network, names).SerializeToString()
     images = np.random.default_rng(0).uniform(0, 255, (N_CHECKED, 1, 3, SIDE_PX, SIDE_PX)).astype(np.float32)
-    first = onnxruntime.InferenceSession(frozen_layers(LIGHTNING).SerializeToString())
+    first = onnxruntime.InferenceSession(frozen_layers(LIGHTNING, names).SerializeToString())
     whole = onnxruntime.InferenceSession(model)
     worst = 0.0
     for image in images:
-        kept = [torch.from_numpy(of) for of in first.run(list(FROZEN), {"image": image})]
+        kept = [torch.from_numpy(of) for of in first.run(names, {"image": image})]
         with torch.no_grad():
             expected = Decoded(network).eval()(*kept).numpy()
         (found,) = whole.run(None, {"image": image})

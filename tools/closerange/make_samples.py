@@ -3,10 +3,10 @@
     python tools/closerange/make_samples.py FOLDER [--n-scenes 2000] [--n-near 1000] [--rounds 4]
                                             [--dask ADDRESS]
 
-writes FOLDER/scenes and FOLDER/near (pictures with annotations), and FOLDER/samples (a file of squares for
-every picture and round). What was finished before is kept. `--dask` renders on an existing cluster.
-Identities are development ones; the seeds differ from every seed that another part of the project uses for
-tuning or for evaluation.
+writes FOLDER/scenes and FOLDER/near (pictures with annotations), and FOLDER/people and FOLDER/hands (a file
+of squares for every picture and round). What was finished before is kept. `--dask` renders on an existing
+cluster. Identities are development ones; the seeds differ from every seed that another part of the project
+uses for tuning or for evaluation.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from closerange.frozen import SIDE_PX  # noqa: E402
+from closerange.frozen import SETS, SIDE_PX  # noqa: E402
 from closerange.samples import draw_sample  # noqa: E402
 from hicp_lib.core.executor import run_jobs  # noqa: E402
 from hicp_lib.core.files import atomic_path, sha256_file  # noqa: E402
@@ -43,16 +43,17 @@ _N_FILLERS = 8
 def draw_image(
     images: Path, people: Annotations, image_id: int, fillers: list[str], seed: int, round_: int, out: Path
 ) -> None:
-    """Write the squares of one picture's people, as `out/<set>_<image>_<round>.npz`."""
+    """Write the squares of one picture's people, or of their hands, as `out`."""
+    of_hand = out.parent.name == "hands"
     name = people.images[image_id].file_name
     image = read_image(images / name)
     patches = [partial(read_image, images / filler) for filler in fillers]
-    rng = np.random.default_rng([seed, image_id, round_])
+    rng = np.random.default_rng([seed, image_id, round_, of_hand])
     found = []
     for row in np.flatnonzero((people.image_ids == image_id) & ~people.is_crowd):
         for _ in range(_PER_PERSON):
             points, visibility = people.keypoints_px[row], people.visibility[row]
-            drawn = (draw_sample(rng, image, points, visibility, patches) for _ in range(_TRIES))
+            drawn = (draw_sample(rng, image, points, visibility, patches, of_hand) for _ in range(_TRIES))
             sample = next((s for s in drawn if s is not None), None)
             if sample is not None:
                 found.append((sample, people.extras[row]["identity"]["body"]))
@@ -68,13 +69,13 @@ def draw_image(
         )
 
 
-def jobs(folder: Path, kind: str, rounds: int) -> Iterator[tuple[str, partial]]:
-    """What is not there yet."""
+def jobs(folder: Path, of: str, kind: str, rounds: int) -> Iterator[tuple[str, partial]]:
+    """What is not there yet, of "people" or "hands"."""
     people = read_annotations(folder / kind / "annotations.json")
     names = sorted(image.file_name for image in people.images.values())
     for image_id in people.images:
         for round_ in range(rounds):
-            out = folder / "samples" / f"{kind}_{image_id:06d}_{round_}.npz"
+            out = folder / of / f"{kind}_{image_id:06d}_{round_}.npz"
             if not out.exists():
                 chosen = np.random.default_rng([SEEDS[kind], image_id, round_, 1]).choice(names, _N_FILLERS)
                 of_image = (folder / kind / "images", people, image_id, chosen.tolist(), SEEDS[kind], round_)
@@ -90,15 +91,16 @@ def main() -> None:
     parser.add_argument("--dask")
     arguments = parser.parse_args()
     folder, numbers = arguments.folder, {"scenes": arguments.n_scenes, "near": arguments.n_near}
-    (folder / "samples").mkdir(parents=True, exist_ok=True)
     cv2.setNumThreads(1)
     for kind, n in numbers.items():
         place = folder / kind
         render_dataset(place, n, SEEDS[kind], arguments.dask, split=DEVELOPMENT, staged=STAGES[kind])
         print(kind, sha256_file(place / "annotations.json"))
-        for _ in run_jobs(jobs(folder, kind, arguments.rounds)):
-            pass
-    print(len(list((folder / "samples").glob("*.npz"))), "files of squares")
+        for of in SETS:
+            (folder / of).mkdir(exist_ok=True)
+            for _ in run_jobs(jobs(folder, of, kind, arguments.rounds)):
+                pass
+    print({of: len(list((folder / of).glob("*.npz"))) for of in SETS}, "files of squares")
 
 
 if __name__ == "__main__":

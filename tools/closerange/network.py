@@ -19,7 +19,7 @@ from onnx import helper, numpy_helper
 from torch import nn
 from torch.nn import functional
 
-from .frozen import FROZEN, GRID, N_BODY, N_KEYPOINTS, SHAPES, STRIDE
+from .frozen import FROZEN, GRID, N_BODY, SETS, SHAPES, STRIDE
 
 _MIDDLE, _LAST = "Add_168_0", "Conv_214_0"
 _MIDDLE_CHANNELS, _LAST_CHANNELS = 96, 320
@@ -93,19 +93,22 @@ class CloseRange(nn.Module):
     ----------
     lightning : Path
         MoveNet Lightning's file.
+    squares : str
+        "people" or "hands"; the network of hands has 21 maps, and no maps of MoveNet's.
     width : int
         Channels of the decoder at its finest.
     """
 
-    def __init__(self, lightning: Path, width: int = 96) -> None:
+    def __init__(self, lightning: Path, squares: str = "people", width: int = 96) -> None:
         super().__init__()
+        n, self.n_body = len(SETS[squares]), N_BODY if squares == "people" else 0
         self.tail = Convolutions(lightning, FROZEN["sixteenth"], [_MIDDLE, _LAST])
         wide = 2 * width
         self.lateral = nn.ModuleDict({
             "last": nn.Conv2d(_LAST_CHANNELS, wide, 1),
             "sixteenth": nn.Conv2d(SHAPES["sixteenth"][0] + _MIDDLE_CHANNELS, wide, 1),
             "eighth": nn.Conv2d(SHAPES["eighth"][0], width, 1),
-            "quarter": nn.Conv2d(SHAPES["quarter"][0] + N_BODY, width, 1),
+            "quarter": nn.Conv2d(SHAPES["quarter"][0] + self.n_body, width, 1),
         })  # fmt: skip
         self.merge = nn.ModuleDict({
             "last": _separable(wide, wide),
@@ -113,26 +116,27 @@ class CloseRange(nn.Module):
             "eighth": _separable(width, width),
             "quarter": nn.Sequential(_separable(width, width), _separable(width, width)),
         })  # fmt: skip
-        self.maps = nn.Conv2d(width, N_KEYPOINTS, 1)
-        self.body_gain = nn.Parameter(torch.full((N_BODY, 1, 1), 1.5))
-        self.pooled = nn.Sequential(nn.Linear(wide + width, 256), nn.ReLU(), nn.Linear(256, 2 * N_KEYPOINTS))
-        self.peak = nn.Parameter(torch.tensor([[0.5, 0.2], [0.5, 0.2]])[..., None].repeat(1, 1, N_KEYPOINTS))
+        self.maps = nn.Conv2d(width, n, 1)
+        self.body_gain = nn.Parameter(torch.full((self.n_body, 1, 1), 1.5))
+        self.pooled = nn.Sequential(nn.Linear(wide + width, 256), nn.ReLU(), nn.Linear(256, 2 * n))
+        self.peak = nn.Parameter(torch.tensor([[0.5, 0.2], [0.5, 0.2]])[..., None].repeat(1, 1, n))
 
-    def forward(self, quarter, eighth, sixteenth, body) -> tuple[torch.Tensor, torch.Tensor]:
-        """Maps (n, 136, 48, 48) and answers (n, 2, 136), all logits."""
+    def forward(self, quarter, eighth, sixteenth, *body) -> tuple[torch.Tensor, torch.Tensor]:
+        """Maps (n, 136 or 21, 48, 48) and answers (n, 2, 136 or 21), all logits."""
         middle, last = self.tail(sixteenth)
         coarse = self.merge["last"](functional.relu(self.lateral["last"](last)))
         sides = self.lateral["sixteenth"](torch.cat([sixteenth, middle], dim=1))
         fine = self.merge["sixteenth"](functional.relu(sides + _doubled(coarse)))
         finer = self.merge["eighth"](functional.relu(self.lateral["eighth"](eighth) + _doubled(fine)))
-        sides = self.lateral["quarter"](torch.cat([quarter, body / 8], dim=1))
+        sides = self.lateral["quarter"](torch.cat([quarter, *(of / 8 for of in body)], dim=1))
         maps = self.maps(self.merge["quarter"](functional.relu(sides + _doubled(finer))))
-        maps = torch.cat([maps[:, :N_BODY] + self.body_gain * body, maps[:, N_BODY:]], dim=1)
+        for of in body:
+            maps = torch.cat([maps[:, :N_BODY] + self.body_gain * of, maps[:, N_BODY:]], dim=1)
         flat = maps.detach().flatten(2)
         highest, spread = flat.amax(dim=2), flat.logsumexp(dim=2)
         evidence = torch.stack([highest, highest - spread], dim=1)
         context = torch.cat([coarse.mean(dim=(2, 3)), fine.amax(dim=(2, 3))], dim=1)
-        answers = self.pooled(context).unflatten(1, (2, N_KEYPOINTS))
+        answers = self.pooled(context).unflatten(1, (2, -1))
         return maps, answers + (self.peak * evidence[:, None]).sum(dim=2)
 
 
@@ -152,9 +156,9 @@ class Decoded(nn.Module):
         self.network = network
         self.register_buffer("cells", torch.arange(GRID, dtype=torch.float32))
 
-    def forward(self, quarter, eighth, sixteenth, body) -> torch.Tensor:
-        """Shape (n, 136, 5): x, y, share of the map near the position, in the picture, visible."""
-        maps, answers = self.network(quarter, eighth, sixteenth, body)
+    def forward(self, *features: torch.Tensor) -> torch.Tensor:
+        """Shape (n, 136 or 21, 5): x, y, share of the map near the position, in the picture, visible."""
+        maps, answers = self.network(*features)
         likely = maps.flatten(2).softmax(dim=2)
         best = likely.argmax(dim=2)
         row, column = torch.div(best, GRID, rounding_mode="floor").float(), (best % GRID).float()

@@ -27,6 +27,7 @@ def chosen_rows(truth: dict[str, np.ndarray], views: str, share: float) -> tuple
     bodies, pictures = sorted(set(truth["body"])), sorted(set(truth["picture"]))
     back = np.isin(truth["body"], bodies[-HELD_BACK:])
     used = np.random.default_rng(0).permutation(pictures)[: round(share * len(pictures))]
-    chosen = ~back & np.isin(truth["view"], views.split("+")) & np.isin(truth["picture"], used)
+    of_view = np.isin(truth["view"], views.split("+")) if views else True
+    chosen = ~back & of_view & np.isin(truth["picture"], used)
     checking = np.flatnonzero(back)
     return np.flatnonzero(chosen), checking[:: max(1, len(checking) // N_CHECKED)]

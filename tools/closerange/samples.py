@@ -1,8 +1,9 @@
 """Squares to train on: parts of rendered pictures around one person, changed at random, with exact truth.
 
 Each square shows what a robot's camera, or a crop of HiCP, could show of one person: all of it, all but the
-head, one part, or a hand. Light, colours, sharpness, noise, compression and occluding patches are changed at
-random, since rendered pictures have less variety than photographs.
+head, one part, or a hand, which is always a right one, since left ones are mirrored. Light, colours,
+sharpness, noise, compression and occluding patches are changed at random, since rendered pictures have less
+variety than photographs.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from hicp_lib.datasets.close import AIMS
 
 from .frozen import SIDE_PX
 
-VIEWS = {"whole": 0.30, "headless": 0.25, "part": 0.15, "hand": 0.30}
-"""Shares of the views."""
+VIEWS = {"whole": 0.4, "headless": 0.4, "part": 0.2}
+"""Shares of the views of people."""
 _LEAST_PX = 24  # of a view's longer side in the picture
 _LEAST_POINTS = 4
 _MIRROR = mirror("halpe136")
@@ -38,7 +39,7 @@ class Sample:
     seen : array, shape (136,), dtype uint8
         0 not in the square, 1 hidden, 2 visible.
     view : str
-        Of `VIEWS`.
+        Of `VIEWS`, or "hand".
     """
 
     square: np.ndarray
@@ -49,9 +50,9 @@ class Sample:
 
 def draw_sample(
     rng: np.random.Generator, image: np.ndarray, keypoints_px: np.ndarray, visibility: np.ndarray,
-    fillers: list[Callable[[], np.ndarray]],
+    fillers: list[Callable[[], np.ndarray]], of_hand: bool = False,
 ) -> Sample | None:  # fmt: skip
-    """A random square of a person.
+    """A random square of a person, or of a hand.
 
     Parameters
     ----------
@@ -63,6 +64,7 @@ def draw_sample(
         As of `hicp_lib.formats.annotations.Annotations`.
     fillers : list of callable
         Give pictures whose parts serve as occluders.
+    of_hand : bool
 
     Returns
     -------
@@ -71,8 +73,11 @@ def draw_sample(
     """
     size_px = np.array(image.shape[1::-1])
     inside = (visibility > 0) & ((keypoints_px >= -0.5) & (keypoints_px < size_px - 0.5)).all(axis=1)
-    view = str(rng.choice(list(VIEWS), p=list(VIEWS.values())))
-    box = _view(rng, view, keypoints_px, inside, visibility, size_px)
+    view = "hand" if of_hand else str(rng.choice(list(VIEWS), p=list(VIEWS.values())))
+    if of_hand:
+        box, is_mirrored = _hand_view(rng, keypoints_px, inside, visibility)
+    else:
+        box, is_mirrored = _view(rng, view, keypoints_px, inside, size_px), rng.random() < 0.5
     if box is None:
         return None
     square, matrix = _warped(rng, image, box, view)
@@ -82,7 +87,7 @@ def draw_sample(
     seen = np.where(within, np.where(visibility >= 2, 2, 1), 0).astype(np.uint8)
     if (seen > 0).sum() < _LEAST_POINTS or not (seen == 2).any():
         return None
-    if rng.random() < 0.5:
+    if is_mirrored:
         square, points, seen = square[:, ::-1], points * [-1, 1] + [SIDE_PX - 1, 0], seen[_MIRROR]
         points = points[_MIRROR]
     square = np.ascontiguousarray(square)
@@ -93,12 +98,9 @@ def draw_sample(
 
 
 def _view(
-    rng: np.random.Generator, view: str, points: np.ndarray, inside: np.ndarray, visibility: np.ndarray,
-    size_px: np.ndarray,
-) -> np.ndarray | None:  # fmt: skip
+    rng: np.random.Generator, view: str, points: np.ndarray, inside: np.ndarray, size_px: np.ndarray
+) -> np.ndarray | None:
     """Left, top, right, bottom of the part of the picture to show."""
-    if view == "hand":
-        return _hand_view(rng, points, inside, visibility)
     chosen = inside
     if view == "part":
         aim = AIMS[str(rng.choice(list(AIMS)))]
@@ -129,17 +131,18 @@ def _within(points: np.ndarray, box: np.ndarray) -> np.ndarray:
 
 def _hand_view(
     rng: np.random.Generator, points: np.ndarray, inside: np.ndarray, visibility: np.ndarray
-) -> np.ndarray | None:
+) -> tuple[np.ndarray | None, bool]:
+    """The part of the picture to show, and whether it is of a left hand."""
     hands = [of for of in (LEFT_HAND, RIGHT_HAND) if (inside & (visibility >= 2))[of].sum() >= _LEAST_POINTS]
     if not hands:
-        return None
-    hand = points[hands[rng.integers(len(hands))]]
-    low, high = np.nanmin(hand, axis=0), np.nanmax(hand, axis=0)
+        return None, False
+    of = hands[rng.integers(len(hands))]
+    low, high = np.nanmin(points[of], axis=0), np.nanmax(points[of], axis=0)
     side = max((high - low).max(), 10) * rng.uniform(1.3, 3.0)
     centre = (low + high) / 2 + rng.uniform(-0.12, 0.12, 2) * side
     if side < _LEAST_PX:
-        return None
-    return np.array([*(centre - side / 2), *(centre + side / 2)])
+        return None, False
+    return np.array([*(centre - side / 2), *(centre + side / 2)]), of is LEFT_HAND
 
 
 def _warped(

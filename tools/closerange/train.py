@@ -1,7 +1,7 @@
 """Train the network for close range on the squares of `make_samples.py`.
 
-    python tools/closerange/train.py FOLDER OUT [--steps 8000] [--seed 0] [--threads 2] [--tail-rate .1]
-                                     [--share 1] [--views whole+headless+part+hand]
+    python tools/closerange/train.py FOLDER OUT [--squares hands] [--steps 8000] [--seed 0] [--threads 2]
+                                     [--tail-rate .1] [--share 1] [--views whole+headless+part]
 
 Writes, every 500 steps, OUT/state.pt, from which a stopped training goes on, and OUT/curve.csv, losses and
 errors; OUT/configuration.json with all numbers and the data's hash. The same seed, data, and number of
@@ -25,11 +25,10 @@ from torch.nn import functional
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from closerange.features import load_features, load_truth, squares_sha256  # noqa: E402
-from closerange.frozen import GRID, SIDE_PX, STRIDE  # noqa: E402
+from closerange.frozen import GRID, SETS, SIDE_PX, STRIDE, inputs_of  # noqa: E402
 from closerange.network import CloseRange, Decoded  # noqa: E402
 from closerange.rows import batches, chosen_rows  # noqa: E402
-from closerange.samples import VIEWS  # noqa: E402
-from hicp_lib.core.keypoints import BODY, COCO_17, FACE, HANDS, SIGMAS  # noqa: E402
+from hicp_lib.core.keypoints import BODY, COCO_17, FACE, HANDS, N_KEYPOINTS, SIGMAS  # noqa: E402
 
 LIGHTNING = Path(__file__).parents[2] / "data" / "weights" / "movenet-lightning.onnx"
 CHECK_STEPS = 500
@@ -37,6 +36,7 @@ BATCH, RATE, DECAY, WARM_UP = 32, 2e-3, 1e-4, 100
 SIGMA_CELLS = 1.0
 HIDDEN_WEIGHT, BODY_WEIGHT, FACE_WEIGHT, ANSWER_WEIGHT = 0.3, 2.0, 0.2, 2.0
 AVERAGE = 0.998  # of the running mean of the weights
+GROUPS = {"body": COCO_17, "face": FACE, "hand": HANDS}
 
 
 def targets(keypoints_px: torch.Tensor) -> torch.Tensor:
@@ -48,21 +48,30 @@ def targets(keypoints_px: torch.Tensor) -> torch.Tensor:
     return maps / maps.sum(dim=1, keepdim=True).clamp_min(1e-6)
 
 
-def losses(network: CloseRange, features: list, keypoints_px: torch.Tensor, seen: torch.Tensor) -> list:
+def losses(
+    network: CloseRange, features: list, points_px: torch.Tensor, seen: torch.Tensor, weights: torch.Tensor
+) -> list:
     """Of positions, and of the two answers."""
     maps, answers = network(*features)
     there = seen > 0
-    weight = torch.where(seen == 2, 1.0, HIDDEN_WEIGHT)
-    weight[:, BODY] *= BODY_WEIGHT
-    weight[:, FACE] *= FACE_WEIGHT
+    weight = torch.where(seen == 2, 1.0, HIDDEN_WEIGHT) * weights
     log_likely = maps.flatten(2)[there].log_softmax(dim=1)
-    wrong = -(targets(keypoints_px[there]) * log_likely).sum(dim=1)
+    wrong = -(targets(points_px[there]) * log_likely).sum(dim=1)
     truth = torch.stack([there, seen == 2], dim=1).float()
     answered = functional.binary_cross_entropy_with_logits(answers, truth)
     return [(wrong * weight[there]).sum() / weight[there].sum(), answered]
 
 
-def errors(network: CloseRange, features: dict, truth: dict, rows: np.ndarray) -> dict[str, float]:
+def keypoint_weights() -> torch.Tensor:
+    """How much each of the 136 keypoints counts."""
+    weights = torch.ones(N_KEYPOINTS)
+    weights[BODY], weights[FACE] = BODY_WEIGHT, FACE_WEIGHT
+    return weights
+
+
+def errors(
+    network: CloseRange, features: dict, truth: dict, rows: np.ndarray, points: np.ndarray
+) -> dict[str, float]:
     """Mean OKS-like similarity of visible keypoints by group, with the square's side as scale; accuracy."""
     decoded = Decoded(network).eval()
     similar, right = [], []
@@ -70,15 +79,14 @@ def errors(network: CloseRange, features: dict, truth: dict, rows: np.ndarray) -
         for k in range(0, len(rows), BATCH):
             of = rows[k : k + BATCH]
             found = decoded(*_batch(features, of)).numpy()
-            points, seen = truth["keypoints_px"][of], truth["seen"][of]
-            off = ((found[..., :2] - points) ** 2).sum(axis=2)
-            similar.append(
-                np.where(seen == 2, np.exp(-off / 2 / (2 * SIGMAS["halpe"] * SIDE_PX / 2) ** 2), np.nan)
-            )
+            true_px, seen = truth["keypoints_px"][of][:, points], truth["seen"][of][:, points]
+            off_px2 = ((found[..., :2] - true_px) ** 2).sum(axis=2)
+            near = np.exp(-off_px2 / 2 / (SIGMAS["halpe"][points] * SIDE_PX) ** 2)
+            similar.append(np.where(seen == 2, near, np.nan))
             right.append((found[..., 3] >= 0.5) == (seen > 0))
     similarity = np.concatenate(similar)
-    groups = {"body": COCO_17, "face": FACE, "hand": HANDS}
-    by_group = {name: float(np.nanmean(similarity[:, of])) for name, of in groups.items()}
+    groups = {name: np.isin(points, of) for name, of in GROUPS.items()}
+    by_group = {name: float(np.nanmean(similarity[:, of])) for name, of in groups.items() if of.any()}
     return by_group | {"in_picture_right": float(np.concatenate(right).mean())}
 
 
@@ -89,7 +97,7 @@ def _batch(features: dict[str, np.ndarray], rows: np.ndarray) -> list[torch.Tens
 
 def start(options: argparse.Namespace) -> tuple[CloseRange, dict]:
     """The network, and all that is stored of a training."""
-    network = CloseRange(LIGHTNING, options.width).to(memory_format=torch.channels_last)
+    network = CloseRange(LIGHTNING, options.squares, options.width).to(memory_format=torch.channels_last)
     network.tail.requires_grad_(options.tail_rate > 0)
     average = torch.optim.swa_utils.AveragedModel(
         network, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(AVERAGE), use_buffers=True
@@ -110,13 +118,15 @@ def train(options: argparse.Namespace) -> None:
     torch.use_deterministic_algorithms(True)
     folder, out = options.folder, options.out
     out.mkdir(parents=True, exist_ok=True)
-    truth, features = load_truth(folder), load_features(folder, LIGHTNING, options.threads)
+    of, keypoints, squares = options.squares, SETS[options.squares], folder / options.squares
+    truth, features = load_truth(squares), load_features(squares, LIGHTNING, inputs_of(of), options.threads)
     training, checking = chosen_rows(truth, options.views, options.share)
+    weights = keypoint_weights()[keypoints]
     network, parts = start(options)
     numbers = {name: value for name, value in vars(options).items() if name not in ("folder", "out")} | {
         "batch": BATCH, "rate": RATE, "decay": DECAY, "average": AVERAGE, "hidden_weight": HIDDEN_WEIGHT,
         "body_weight": BODY_WEIGHT, "face_weight": FACE_WEIGHT, "answer_weight": ANSWER_WEIGHT,
-        "n_training": len(training), "n_checking": len(checking), "squares_sha256": squares_sha256(folder),
+        "n_training": len(training), "n_checking": len(checking), "squares_sha256": squares_sha256(squares),
         "held_back": sorted(set(truth["body"][checking])), "torch": torch.__version__,
     }  # fmt: skip
     (out / "configuration.json").write_text(json.dumps(numbers, indent=1) + "\n")
@@ -129,9 +139,11 @@ def train(options: argparse.Namespace) -> None:
     sums, began = [], time.perf_counter()
     for step, rows in enumerate(batches(training, BATCH, options.seed, done, options.steps), done + 1):
         network.train()
-        points, seen = (torch.from_numpy(truth[name][rows]) for name in ("keypoints_px", "seen"))
+        true_px, seen = (
+            torch.from_numpy(truth[name][rows][:, keypoints]) for name in ("keypoints_px", "seen")
+        )
         parts["optimizer"].zero_grad()
-        wrong, answered = losses(network, _batch(features, rows), points, seen)
+        wrong, answered = losses(network, _batch(features, rows), true_px, seen, weights)
         (wrong + ANSWER_WEIGHT * answered).backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
         parts["optimizer"].step()
@@ -141,7 +153,7 @@ def train(options: argparse.Namespace) -> None:
         if step % CHECK_STEPS and step != options.steps:
             continue
         at = {"step": step} | dict(zip(("loss_position", "loss_answers"), np.mean(sums, axis=0), strict=True))
-        curve.append(at | errors(parts["average"].module, features, truth, checking))
+        curve.append(at | errors(parts["average"].module, features, truth, checking, keypoints))
         said = {name: round(float(value), 3) for name, value in curve[-1].items()}
         print(f"{time.perf_counter() - began:.0f} s", said, flush=True)
         pd.DataFrame(curve).to_csv(out / "curve.csv", index=False, lineterminator="\n", float_format="%.5f")
@@ -155,6 +167,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("out", type=Path)
+    parser.add_argument("--squares", choices=list(SETS), default="people")
     parser.add_argument("--steps", type=int, default=8000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=2)
@@ -163,7 +176,7 @@ def main() -> None:
         "--tail-rate", type=float, default=0.1, help="of MoveNet's layers, as part of the rest's"
     )
     parser.add_argument("--share", type=float, default=1.0, help="of the squares, for the learning curve")
-    parser.add_argument("--views", default="+".join(VIEWS), help="kinds of squares, joined by +")
+    parser.add_argument("--views", default="", help="kinds of squares of people, joined by +; all of them")
     train(parser.parse_args())
 
 

@@ -5,7 +5,8 @@ and without heads (`tools/closerange`, which made the file). Each box (by defaul
 to a square, padded with black. The network gives for each keypoint its position in the square, the share of
 its map near that position, and the probabilities that it is in the picture and that it is visible.
 
-Hands are small in such a square, so the same network looks at each of them again, in a square of its own.
+Hands are small in such a square, so a second network of the same kind looks at each of them again, in a
+square of its own. It knows right hands; left ones are mirrored.
 """
 
 from pathlib import Path
@@ -15,7 +16,7 @@ import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.keypoints import COCO_17
+from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS
 from hicp_lib.detectors.combined.hand_squares import HAND_POINTS
 from hicp_lib.detectors.onnx.box_source import BoxOptions, BoxSource
 from hicp_lib.detectors.onnx.fitting import Regions
@@ -31,8 +32,8 @@ class CloseRange:
 
     Parameters
     ----------
-    model : str or Path, optional
-        Another file that `tools/closerange/export.py` wrote.
+    model, hand_model : str or Path, optional
+        Other files that `tools/closerange/export.py` wrote.
     padding : float
         Factor by which boxes are enlarged before they become squares.
     look_again : bool
@@ -44,16 +45,19 @@ class CloseRange:
     name = "closerange"
 
     def __init__(
-        self, model: str | Path | None = None, padding: float = 1.0, look_again: bool = True,
-        **person_boxes: Unpack[BoxOptions],
+        self, model: str | Path | None = None, hand_model: str | Path | None = None, padding: float = 1.0,
+        look_again: bool = True, **person_boxes: Unpack[BoxOptions],
     ) -> None:  # fmt: skip
         self._boxes = BoxSource(**person_boxes)
-        run = self._boxes.run
-        self._model = open_model(model, **run) if model else open_committed(f"{self.name}.onnx", **run)
+        run, ours = self._boxes.run, {f"{self.name}.onnx": model, f"{self.name}-hands.onnx": hand_model}
+        self._model, self._hand_model = (
+            open_model(of, **run) if of else open_committed(file, **run) for file, of in ours.items()
+        )
         self._padding, self._looks_again = padding, look_again
         self.takes_boxes = self._boxes.kind == "gt"
         self.settings: dict[str, Any] = {"padding": padding, "look_again": look_again}
-        self.settings |= {"model": self._model.settings, "opencv": cv2.__version__} | self._boxes.settings
+        self.settings |= {"model": self._model.settings, "hand_model": self._hand_model.settings}
+        self.settings |= {"opencv": cv2.__version__} | self._boxes.settings
 
     def detect(self, image: np.ndarray, boxes_px: np.ndarray | None = None) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8.
@@ -77,21 +81,29 @@ class CloseRange:
         """Per region and keypoint x, y in the image, share near it, in the picture, visible; (n, 136, 5)."""
         size_px = self._model.size_px
         runs = [self._model.run(cv2.dnn.blobFromImage(crop))[0] for crop in regions.crop(image, size_px)]
-        found = np.concatenate([np.zeros((0, 136, 5)), *runs])
+        found = np.concatenate([np.zeros((0, N_KEYPOINTS, 5)), *runs])
         found[..., :2] = regions.to_image_px(found[..., :2], size_px)
         return found
 
     def _refine_hands(self, image: np.ndarray, person: np.ndarray) -> None:
         """Replace the points of a person's hands (136, 5) by those of a closer look."""
-        for points in HAND_POINTS:
+        for points, is_left in zip(HAND_POINTS, (True, False), strict=True):
             hand = person[points]
-            if (hand[:, 3] >= _PRESENT).mean() < _PRESENT:
-                continue
             low, high = hand[:, :2].min(axis=0), hand[:, :2].max(axis=0)
-            side_px = _HAND_SIDE * (high - low).max()
-            if side_px < _HAND_SIDE * _LEAST_PX:
-                continue
-            centre = (low + high) / 2
-            box = np.array([[*(centre - side_px / 2), side_px, side_px]])
-            again = self._look(image, Regions.around(box, self._model.size_px, 1.0))[0]
-            person[points, :3] = again[points, :3]
+            extent_px = (high - low).max()
+            if (hand[:, 3] >= _PRESENT).mean() >= _PRESENT and extent_px >= _LEAST_PX:
+                side_px = _HAND_SIDE * extent_px
+                box = np.array([[*((low + high - side_px) / 2), side_px, side_px]])
+                person[points, :3] = self._look_at_hand(image, box, is_left)[:, :3]
+
+    def _look_at_hand(self, image: np.ndarray, box_px: np.ndarray, is_left: bool) -> np.ndarray:
+        """As `_look`, of one hand (21, 5)."""
+        size_px = self._hand_model.size_px
+        region = Regions.around(box_px, size_px, 1.0)
+        (crop,) = region.crop(image, size_px)
+        crop = np.ascontiguousarray(crop[:, ::-1]) if is_left else crop
+        found = self._hand_model.run(cv2.dnn.blobFromImage(crop))[0].astype(float)
+        if is_left:
+            found[..., 0] = size_px[0] - 1 - found[..., 0]
+        found[..., :2] = region.to_image_px(found[..., :2], size_px)
+        return found[0]
