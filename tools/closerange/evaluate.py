@@ -1,6 +1,6 @@
 """Evaluate networks for close range, and what they are held against, on rendered people.
 
-    python tools/closerange/evaluate.py NAME=MODEL.onnx [...] --out TABLES [--development N]
+    python tools/closerange/evaluate.py NAME=PEOPLE.onnx,HANDS.onnx [...] --out TABLES [--development N]
                                         [--photographs CHECKOUT] [--no-look]
 
 By default on the held-out people of the full study: Basic, Headless and Near. `--development N`: on N scenes
@@ -58,32 +58,33 @@ def development(n_scenes: int) -> tuple[dict[str, Path], Path]:
     return {subset: folder / "hicp" / subset for subset in ("basic", "headless")}, annotations
 
 
-def detect(folders: dict[str, Path], others: tuple, models: dict[str, str], no_look: bool) -> dict:
+def detect(folders: dict[str, Path], others: tuple, models: dict[str, list[str]], no_look: bool) -> dict:
     """Detections by subset and detector, then by image."""
     found = {}
     for subset, folder in folders.items():
         for name in others:
             options = _ALL_LOOKS if name.startswith("combined:") else {}
             found[subset, name] = detections_of(time_dataset(name, folder, **options))
-        for name, model in models.items():
+        for name, (model, hand_model) in models.items():
             looks = {f"closerange, {name}": True}
             if no_look:
                 looks[f"closerange, {name}, one look"] = False
             for label, look in looks.items():
-                run = time_dataset("closerange", folder, model=model, look_again=look)
+                run = time_dataset("closerange", folder, model=model, hand_model=hand_model, look_again=look)
                 found[subset, label] = detections_of(run)
     return found
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("models", nargs="+", help="NAME=FILE.onnx")
+    parser.add_argument("models", nargs="+", help="NAME=PEOPLE.onnx,HANDS.onnx")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--development", type=int, default=0, metavar="N")
     parser.add_argument("--no-look", action="store_true", help="also without a second look at hands")
     parser.add_argument("--photographs", type=Path, metavar="CHECKOUT")
     arguments = parser.parse_args()
-    models = dict(given.split("=", 1) for given in arguments.models)
+    given = dict(text.split("=", 1) for text in arguments.models)
+    models = {name: files.split(",") for name, files in given.items()}
     groups, others = metric_table.GROUPS_OF_OBJECTS, OTHERS
     with tempfile.TemporaryDirectory() as place:
         if arguments.photographs:
