@@ -36,6 +36,7 @@ BATCH, RATE, DECAY, WARM_UP = 32, 2e-3, 1e-4, 100
 SIGMA_CELLS = 1.0
 HIDDEN_WEIGHT, BODY_WEIGHT, FACE_WEIGHT, ANSWER_WEIGHT = 0.3, 2.0, 0.2, 2.0
 AVERAGE = 0.998  # of the running mean of the weights
+MIXED = 0.3  # parameter of how features are mixed
 GROUPS = {"body": COCO_17, "face": FACE, "hand": HANDS}
 
 
@@ -60,6 +61,23 @@ def losses(
     truth = torch.stack([there, seen == 2], dim=1).float()
     answered = functional.binary_cross_entropy_with_logits(answers, truth)
     return [(wrong * weight[there]).sum() / weight[there].sum(), answered]
+
+
+def restyled(features: list[torch.Tensor], share: float) -> list[torch.Tensor]:
+    """Features with means and deviations of their channels mixed with those of other squares.
+
+    Rendered pictures differ from photographs in such statistics, which the decoder is thus kept from relying
+    on (Zhou et al., "Domain generalization with MixStyle", ICLR 2021). MoveNet's maps stay.
+    """
+    n = len(features[0])
+    other, mix = torch.randperm(n), torch.distributions.Beta(MIXED, MIXED).sample((n, 1, 1, 1))
+    mix = torch.where(torch.rand(n, 1, 1, 1) < share, mix, 1.0)
+    changed = []
+    for of in features[:3]:
+        mean, deviation = of.mean(dim=(2, 3), keepdim=True), of.std(dim=(2, 3), keepdim=True) + 1e-5
+        mean_to, deviation_to = (mix * own + (1 - mix) * own[other] for own in (mean, deviation))
+        changed.append((of - mean) / deviation * deviation_to + mean_to)
+    return [*changed, *features[3:]]
 
 
 def keypoint_weights() -> torch.Tensor:
@@ -143,7 +161,9 @@ def train(options: argparse.Namespace) -> None:
             torch.from_numpy(truth[name][rows][:, keypoints]) for name in ("keypoints_px", "seen")
         )
         parts["optimizer"].zero_grad()
-        wrong, answered = losses(network, _batch(features, rows), true_px, seen, weights)
+        wrong, answered = losses(
+            network, restyled(_batch(features, rows), options.restyle), true_px, seen, weights
+        )
         (wrong + ANSWER_WEIGHT * answered).backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
         parts["optimizer"].step()
@@ -175,6 +195,7 @@ def main() -> None:
     parser.add_argument(
         "--tail-rate", type=float, default=0.1, help="of MoveNet's layers, as part of the rest's"
     )
+    parser.add_argument("--restyle", type=float, default=0.5, help="share of squares with mixed features")
     parser.add_argument("--share", type=float, default=1.0, help="of the squares, for the learning curve")
     parser.add_argument("--views", default="", help="kinds of squares of people, joined by +; all of them")
     train(parser.parse_args())
