@@ -157,6 +157,7 @@ def train(options: argparse.Namespace) -> None:
     sums, began = [], time.perf_counter()
     for step, rows in enumerate(batches(training, BATCH, options.seed, done, options.steps), done + 1):
         network.train()
+        torch.manual_seed(options.seed + 1_000_003 * step)  # a stopped training goes on as if it had not been
         true_px, seen = (
             torch.from_numpy(truth[name][rows][:, keypoints]) for name in ("keypoints_px", "seen")
         )
