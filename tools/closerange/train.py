@@ -34,7 +34,7 @@ LIGHTNING = Path(__file__).parents[2] / "data" / "weights" / "movenet-lightning.
 CHECK_STEPS = 500
 BATCH, RATE, DECAY, WARM_UP = 32, 2e-3, 1e-4, 100
 SIGMA_CELLS = 1.0
-HIDDEN_WEIGHT, BODY_WEIGHT, FACE_WEIGHT, ANSWER_WEIGHT = 0.3, 2.0, 0.2, 2.0
+BODY_WEIGHT, FACE_WEIGHT, ANSWER_WEIGHT = 2.0, 0.2, 2.0
 AVERAGE = 0.998  # of the running mean of the weights
 MIXED = 0.3  # parameter of how features are mixed
 GROUPS = {"body": COCO_17, "face": FACE, "hand": HANDS}
@@ -50,12 +50,13 @@ def targets(keypoints_px: torch.Tensor) -> torch.Tensor:
 
 
 def losses(
-    network: CloseRange, features: list, points_px: torch.Tensor, seen: torch.Tensor, weights: torch.Tensor
+    network: CloseRange, features: list, points_px: torch.Tensor, seen: torch.Tensor, weights: torch.Tensor,
+    hidden_weight: float,
 ) -> list:
     """Of positions, and of the two answers."""
     maps, answers = network(*features)
     there = seen > 0
-    weight = torch.where(seen == 2, 1.0, HIDDEN_WEIGHT) * weights
+    weight = torch.where(seen == 2, 1.0, hidden_weight) * weights
     log_likely = maps.flatten(2)[there].log_softmax(dim=1)
     wrong = -(targets(points_px[there]) * log_likely).sum(dim=1)
     truth = torch.stack([there, seen == 2], dim=1).float()
@@ -142,7 +143,7 @@ def train(options: argparse.Namespace) -> None:
     weights = keypoint_weights()[keypoints]
     network, parts = start(options)
     numbers = {name: value for name, value in vars(options).items() if name not in ("folder", "out")} | {
-        "batch": BATCH, "rate": RATE, "decay": DECAY, "average": AVERAGE, "hidden_weight": HIDDEN_WEIGHT,
+        "batch": BATCH, "rate": RATE, "decay": DECAY, "average": AVERAGE,
         "body_weight": BODY_WEIGHT, "face_weight": FACE_WEIGHT, "answer_weight": ANSWER_WEIGHT,
         "n_training": len(training), "n_checking": len(checking), "squares_sha256": squares_sha256(squares),
         "held_back": sorted(set(truth["body"][checking])), "torch": torch.__version__,
@@ -162,9 +163,8 @@ def train(options: argparse.Namespace) -> None:
             torch.from_numpy(truth[name][rows][:, keypoints]) for name in ("keypoints_px", "seen")
         )
         parts["optimizer"].zero_grad()
-        wrong, answered = losses(
-            network, restyled(_batch(features, rows), options.restyle), true_px, seen, weights
-        )
+        given = restyled(_batch(features, rows), options.restyle)
+        wrong, answered = losses(network, given, true_px, seen, weights, options.hidden_weight)
         (wrong + ANSWER_WEIGHT * answered).backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
         parts["optimizer"].step()
@@ -197,6 +197,7 @@ def main() -> None:
         "--tail-rate", type=float, default=0.1, help="of MoveNet's layers, as part of the rest's"
     )
     parser.add_argument("--restyle", type=float, default=0.5, help="share of squares with mixed features")
+    parser.add_argument("--hidden-weight", type=float, default=0.3, help="of hidden points' positions")
     parser.add_argument("--share", type=float, default=1.0, help="of the squares, for the learning curve")
     parser.add_argument("--views", default="", help="kinds of squares of people, joined by +; all of them")
     train(parser.parse_args())

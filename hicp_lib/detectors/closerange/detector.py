@@ -66,15 +66,13 @@ class CloseRange:
         """
         boxes, box_scores = self._boxes.find(image, boxes_px)
         found = self._look(image, Regions.around(boxes, self._model.size_px, self._padding))
-        there = (found[..., 3] >= _PRESENT).any(axis=1)
-        found, box_scores = found[there], box_scores[there]
         if self._looks_again:
             for person in found:
                 self._refine_hands(image, person)
         present, near = found[..., 3], found[..., 2]
         # At least a half for what is in the picture; beyond, by how sure its position is.
         scores = np.where(present < _PRESENT, present, _PRESENT + (present - _PRESENT) * near)
-        expected = (present * near)[:, COCO_17].sum(axis=1) / present[:, COCO_17].sum(axis=1)
+        expected = np.average(near[:, COCO_17], axis=1, weights=present[:, COCO_17] + 1e-6)
         return Detections.of_parts(found[..., :2], scores, box_scores * expected, "halpe136")
 
     def _look(self, image: np.ndarray, regions: Regions) -> np.ndarray:
