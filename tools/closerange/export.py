@@ -1,6 +1,6 @@
 """Write a trained network into data/weights, and compare it with PyTorch.
 
-    python tools/closerange/export.py OUT [--to data/weights/closerange.onnx]
+    python tools/closerange/export.py OUT [--to data/weights/closerange.onnx] [--body-share 1]
 
 One file: MoveNet's frozen layers and what was trained (the running mean of its weights), with weights in 16
 bits. Input `image`, RGB in 0 to 255, shape (1, 3, 192, 192); output `keypoints`, shape (1, 136, 5), or of a
@@ -34,24 +34,30 @@ MAX_DIFFERENCE_PX, N_CHECKED = 0.5, 8
 _SMALL = 64  # weights with fewer numbers keep 32 bits
 
 
-def trained(out: Path) -> tuple[CloseRange, list[str]]:
-    """The network of a finished training, and what it reads of MoveNet."""
+def trained(out: Path, body_share: float = 1.0) -> tuple[Decoded, list[str]]:
+    """The network of a finished training with its decoding, and what it reads of MoveNet.
+
+    Of what is added to MoveNet's maps of body points, `body_share` is taken.
+    """
     options = json.loads((out / "configuration.json").read_text())
     network = CloseRange(LIGHTNING, options["squares"], options["width"])
     average = torch.load(out / "state.pt", weights_only=True)["average"]
     state = {name.removeprefix("module."): v for name, v in average.items() if name != "n_averaged"}
     network.load_state_dict(state)
-    return network.eval(), inputs_of(options["squares"])
+    with torch.no_grad():
+        for added in (network.maps.weight, network.maps.bias):
+            added[: network.n_body] *= body_share
+    return Decoded(network, options["squares"]).eval(), inputs_of(options["squares"])
 
 
-def exported(network: CloseRange, names: list[str]) -> onnx.ModelProto:
+def exported(network: Decoded, names: list[str]) -> onnx.ModelProto:
     """The whole network as ONNX."""
     example = tuple(torch.zeros(1, *SHAPES[name]) for name in names)
     buffer = io.BytesIO()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         torch.onnx.export(
-            Decoded(network).eval(), example, buffer, input_names=names, output_names=["keypoints"],
+            network, example, buffer, input_names=names, output_names=["keypoints"],
             opset_version=17, dynamo=False,
         )  # fmt: skip
     head = onnx.load_from_string(buffer.getvalue())
@@ -88,8 +94,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--to", type=Path, default=LIGHTNING.with_name("closerange.onnx"))
+    parser.add_argument("--body-share", type=float, default=1.0, help="of what is added to MoveNet's maps")
     arguments = parser.parse_args()
-    network, names = trained(arguments.out)
+    network, names = trained(arguments.out, arguments.body_share)
     model = exported(network, names).SerializeToString()
     images = np.random.default_rng(0).uniform(0, 255, (N_CHECKED, 1, 3, SIDE_PX, SIDE_PX)).astype(np.float32)
     first = onnxruntime.InferenceSession(frozen_layers(LIGHTNING, names).SerializeToString())
@@ -98,7 +105,7 @@ def main() -> None:
     for image in images:
         kept = [torch.from_numpy(of) for of in first.run(names, {"image": image})]
         with torch.no_grad():
-            expected = Decoded(network).eval()(*kept).numpy()
+            expected = network(*kept).numpy()
         (found,) = whole.run(None, {"image": image})
         worst = max(worst, float(np.median(np.abs(found - expected)[..., :2])))
     if worst > MAX_DIFFERENCE_PX:

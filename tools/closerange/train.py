@@ -89,10 +89,9 @@ def keypoint_weights() -> torch.Tensor:
 
 
 def errors(
-    network: CloseRange, features: dict, truth: dict, rows: np.ndarray, points: np.ndarray
+    decoded: Decoded, features: dict, truth: dict, rows: np.ndarray, points: np.ndarray
 ) -> dict[str, float]:
     """Mean OKS-like similarity of visible keypoints by group, with the square's side as scale; accuracy."""
-    decoded = Decoded(network).eval()
     similar, right = [], []
     with torch.no_grad():
         for k in range(0, len(rows), BATCH):
@@ -174,7 +173,8 @@ def train(options: argparse.Namespace) -> None:
         if step % CHECK_STEPS and step != options.steps:
             continue
         at = {"step": step} | dict(zip(("loss_position", "loss_answers"), np.mean(sums, axis=0), strict=True))
-        curve.append(at | errors(parts["average"].module, features, truth, checking, keypoints))
+        decoded = Decoded(parts["average"].module, of).eval()
+        curve.append(at | errors(decoded, features, truth, checking, keypoints))
         said = {name: round(float(value), 3) for name, value in curve[-1].items()}
         print(f"{time.perf_counter() - began:.0f} s", said, flush=True)
         pd.DataFrame(curve).to_csv(out / "curve.csv", index=False, lineterminator="\n", float_format="%.5f")
