@@ -23,7 +23,7 @@ from hicp_lib.core.keypoints import SIGMAS
 
 from .frozen import FROZEN, GRID, N_BODY, SETS, SHAPES, STRIDE
 
-SCALES = {"people": 0.5, "hands": 1.0}
+SCALES = {"people": 0.5, "hands": 1.8}
 """The square root of the area that OKS is measured by, in sides of a square, as it is for many."""
 _REACH, _STEPS = 18, 3  # cells that smoothing reaches; steps of mean shift
 _MIDDLE, _LAST = "Add_168_0", "Conv_214_0"
