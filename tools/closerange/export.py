@@ -4,8 +4,8 @@
 
 One file: MoveNet's frozen layers and what was trained (the running mean of its weights), with weights in 16
 bits. Input `image`, RGB in 0 to 255, shape (1, 3, 192, 192); output `keypoints`, shape (1, 136, 5), or of a
-hand (1, 21, 5): x and y in pixels of the square, share of the map near that position, and the probabilities
-that the keypoint is in the picture and that it is visible.
+hand (1, 21, 5): x and y in pixels of the square, the term of OKS to expect there, and the
+probabilities that the keypoint is in the picture and that it is visible.
 """
 
 from __future__ import annotations

@@ -50,7 +50,11 @@ def targets(keypoints_px: torch.Tensor) -> torch.Tensor:
 
 
 def losses(
-    network: CloseRange, features: list, points_px: torch.Tensor, seen: torch.Tensor, weights: torch.Tensor,
+    network: CloseRange,
+    features: list,
+    points_px: torch.Tensor,
+    seen: torch.Tensor,
+    weights: torch.Tensor,
     hidden_weight: float,
 ) -> list:
     """Of positions, and of the two answers."""

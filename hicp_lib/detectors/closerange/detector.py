@@ -2,8 +2,8 @@
 
 MoveNet Lightning's layers, and a decoder trained on rendered people of development identities, near, cut off
 and without heads (`tools/closerange`, which made the file). Each box (by default the whole image) is scaled
-to a square, padded with black. The network gives for each keypoint its position in the square, the share of
-its map near that position, and the probabilities that it is in the picture and that it is visible.
+to a square, padded with black. The network gives for each keypoint its position in the square, the term of
+OKS to expect there, and the probabilities that it is in the picture and that it is visible.
 
 Hands are small in such a square, so a second network of the same kind looks at each of them again, in a
 square of its own. It knows right hands; left ones are mirrored.
@@ -69,14 +69,14 @@ class CloseRange:
         if self._looks_again:
             for person in found:
                 self._refine_hands(image, person)
-        present, near = found[..., 3], found[..., 2]
+        present, term = found[..., 3], found[..., 2]
         # At least a half for what is in the picture; beyond, by how sure its position is.
-        scores = np.where(present < _PRESENT, present, _PRESENT + (present - _PRESENT) * near)
-        expected = np.average(near[:, COCO_17], axis=1, weights=present[:, COCO_17] + 1e-6)
+        scores = np.where(present < _PRESENT, present, _PRESENT + (present - _PRESENT) * term)
+        expected = np.average(term[:, COCO_17], axis=1, weights=present[:, COCO_17] + 1e-6)
         return Detections.of_parts(found[..., :2], scores, box_scores * expected, "halpe136")
 
     def _look(self, image: np.ndarray, regions: Regions) -> np.ndarray:
-        """Per region and keypoint x, y in the image, share near it, in the picture, visible; (n, 136, 5)."""
+        """Per region and keypoint x, y in the image, expected term, in the picture, visible; (n, 136, 5)."""
         size_px = self._model.size_px
         runs = [self._model.run(cv2.dnn.blobFromImage(crop))[0] for crop in regions.crop(image, size_px)]
         found = np.concatenate([np.zeros((0, N_KEYPOINTS, 5)), *runs])
