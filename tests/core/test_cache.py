@@ -48,7 +48,7 @@ def copy(tmp_path, monkeypatch) -> Path:
     shutil.copytree(LIBRARY_DIR, tmp_path / "hicp_lib", ignore=shutil.ignore_patterns("__pycache__", "data"))
     shutil.copytree(DATA_DIR, tmp_path / "data")
     monkeypatch.setattr(cache, "LIBRARY_DIR", tmp_path / "hicp_lib")
-    monkeypatch.setattr(cache, "DATA_DIR", tmp_path / "data")
+    monkeypatch.setattr(cache, "DATA", tmp_path / "data")
     return tmp_path
 
 
@@ -85,6 +85,11 @@ def test_one_byte_of_the_code_or_the_data_changes_the_key_and_none_outside_does(
     for path in rng.sample(outside, min(12, len(outside))):
         change_one_byte(path, rng)
     assert code(names, without) == before
+
+
+def test_renderings_do_not_depend_on_what_only_pages_read(copy):
+    data = code(["hicp_lib.simulation.world.scenes"]).data
+    assert "body.npz" in data and not {"captions.toml", "detector_styles.json", "claims.json"} & set(data)
 
 
 def test_data_that_are_named_and_not_there_are_told(copy):
