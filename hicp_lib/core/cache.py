@@ -19,8 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from hicp_lib.core.datafiles import DATA_DIR as DATA  # another name: the next pattern finds what is read
-from hicp_lib.core.datafiles import REFERENCE_DIR
+from hicp_lib.core.datafiles import DATA_DIR, REFERENCE_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_bytes, sha256_file
 
@@ -311,7 +310,7 @@ def _read(path: Path, *state: int) -> _Module:
     source = path.read_bytes()
     names = imports_of(source) | set(_NAMED.findall(source.decode()))
     data = frozenset(name or ALL_DATA for name in _DATA.findall(_IMPORT.sub("", source.decode())))
-    if path.name == "datafiles.py":  # defines the folder, and names no file of it
+    if path.name in ("datafiles.py", "cache.py"):  # define and search the folder, and name no file of it
         data = frozenset()
     return _Module(sha256_bytes(source), names, data)
 
@@ -330,13 +329,13 @@ def _imported(tree: ast.AST) -> Iterator[str]:
 
 
 def _data_sha256(patterns: Iterable[str]) -> dict[str, str]:
-    paths, reference = set[Path](), DATA / REFERENCE_DIR.name
+    paths, reference = set[Path](), DATA_DIR / REFERENCE_DIR.name
     for pattern in patterns:
-        found = [path for path in DATA.glob(pattern) if path.is_file() and reference not in path.parents]
+        found = [path for path in DATA_DIR.glob(pattern) if path.is_file() and reference not in path.parents]
         if not found:
-            raise InputError(f"{DATA / pattern}: is missing, and a result depends on it; reinstall hicp")
+            raise InputError(f"{DATA_DIR / pattern}: is missing, and a result depends on it; reinstall hicp")
         paths.update(found)
-    return {p.relative_to(DATA).as_posix(): _file_sha256(p, *_state(p)) for p in sorted(paths)}
+    return {p.relative_to(DATA_DIR).as_posix(): _file_sha256(p, *_state(p)) for p in sorted(paths)}
 
 
 def _state(path: Path) -> tuple[int, int]:

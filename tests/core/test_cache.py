@@ -48,7 +48,7 @@ def copy(tmp_path, monkeypatch) -> Path:
     shutil.copytree(LIBRARY_DIR, tmp_path / "hicp_lib", ignore=shutil.ignore_patterns("__pycache__", "data"))
     shutil.copytree(DATA_DIR, tmp_path / "data")
     monkeypatch.setattr(cache, "LIBRARY_DIR", tmp_path / "hicp_lib")
-    monkeypatch.setattr(cache, "DATA", tmp_path / "data")
+    monkeypatch.setattr(cache, "DATA_DIR", tmp_path / "data")
     return tmp_path
 
 
