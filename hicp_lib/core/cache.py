@@ -310,7 +310,7 @@ def _read(path: Path, *state: int) -> _Module:
     source = path.read_bytes()
     names = imports_of(source) | set(_NAMED.findall(source.decode()))
     data = frozenset(name or ALL_DATA for name in _DATA.findall(_IMPORT.sub("", source.decode())))
-    if path.name == "datafiles.py":  # defines the folder, and names no file of it
+    if path.name in ("datafiles.py", "cache.py"):  # define and search the folder, and name no file of it
         data = frozenset()
     return _Module(sha256_bytes(source), names, data)
 

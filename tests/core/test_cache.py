@@ -87,6 +87,11 @@ def test_one_byte_of_the_code_or_the_data_changes_the_key_and_none_outside_does(
     assert code(names, without) == before
 
 
+def test_renderings_do_not_depend_on_what_only_pages_read(copy):
+    data = code(["hicp_lib.simulation.world.scenes"]).data
+    assert "body.npz" in data and not {"captions.toml", "detector_styles.json", "claims.json"} & set(data)
+
+
 def test_data_that_are_named_and_not_there_are_told(copy):
     (copy / "data" / "icub.json").unlink()
     with pytest.raises(InputError, match=r"icub\.json: is missing, and a result depends on it"):

@@ -1,8 +1,11 @@
 """Rays against surfaces, through Open3D's RaycastingScene."""
 
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from types import ModuleType
 
 import cv2
 import numpy as np
@@ -13,8 +16,23 @@ from hicp_lib.core.environment import with_variables
 from hicp_lib.simulation.rendering.camera import join_rays
 from hicp_lib.simulation.rendering.surfaces import Surface
 
+
+@contextmanager
+def _without_dash() -> Iterator[None]:
+    """Half of the time of Open3D's import is Dash's, which only its plots in a browser need."""
+    if "dash" in sys.modules:
+        yield
+        return
+    sys.modules["dash"] = stand_in = ModuleType("dash")
+    stand_in.__dict__.update(html=None, dcc=None, Dash=None)
+    try:
+        yield
+    finally:
+        del sys.modules["dash"]
+
+
 # Otherwise Open3D starts its web viewer in every notebook that renders.
-with with_variables(OPEN3D_DISABLE_WEB_VISUALIZER="true"):
+with with_variables(OPEN3D_DISABLE_WEB_VISUALIZER="true"), _without_dash():
     import open3d as o3d
 
 DEPTH_STEP = 0.03  # relative difference in depth beyond which neighbours are on different surfaces
