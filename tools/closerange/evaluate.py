@@ -6,8 +6,8 @@
 By default on the held-out people of the full study: Basic, Headless and Near. `--development N`: on N scenes
 of development identities (seed 900003), to choose by. `--photographs CHECKOUT`: on the photographs of
 `tools/photographs.py`, where only bodies are judged. Writes TABLES/metrics.csv (average precision of bodies,
-hands and single hands), TABLES/differences.csv (every network less every other detector) and
-TABLES/extended.csv (by extended OKS).
+hands and single hands), TABLES/differences.csv (every network less every other detector),
+TABLES/ablations.csv (the networks alone, by their names) and TABLES/extended.csv (by extended OKS).
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+import pandas as pd
 from photographs import make_subsets  # noqa: E402
 
 from hicp_lib.core.files import cache_dir
@@ -39,6 +40,7 @@ OTHERS = (
     "combined:movenet-thunder+mediapipe-hands", "combined:mediapipe-pose+mediapipe-hands",
 )  # fmt: skip
 """What networks are held against; of the combinations with all looks (notebook 02b)."""
+_OURS = "closerange, "
 _ALL_LOOKS = {"looks": "wrists+mirrored+image+along"}
 
 
@@ -66,13 +68,21 @@ def detect(folders: dict[str, Path], others: tuple, models: dict[str, list[str]]
             options = _ALL_LOOKS if name.startswith("combined:") else {}
             found[subset, name] = detections_of(time_dataset(name, folder, **options))
         for name, (model, hand_model) in models.items():
-            looks = {f"closerange, {name}": True}
+            looks = {_OURS + name: True}
             if no_look:
-                looks[f"closerange, {name}, one look"] = False
+                looks[f"{_OURS}{name}, one look"] = False
             for label, look in looks.items():
                 run = time_dataset("closerange", folder, model=model, hand_model=hand_model, look_again=look)
                 found[subset, label] = detections_of(run)
     return found
+
+
+def ablations(metrics: pd.DataFrame) -> pd.DataFrame:
+    """Average precision of networks, by the names they were given."""
+    ours = metrics["detector"].str.startswith(_OURS) & (metrics["metric"] == "AP")
+    of = metrics[ours & metrics["group"].isin(["body", "hand"])]
+    variants = of["detector"].str.removeprefix(_OURS)
+    return of.assign(variant=variants)[["variant", "subset", "group", "value", "low", "high"]]
 
 
 def main() -> None:
@@ -97,8 +107,8 @@ def main() -> None:
     draws = Draws(1000, 0)
     drawn = metric_table.draw_cases(truth, found, draws, groups)
     metrics, pairs = metric_table.metric_table(drawn), metric_table.pairs(drawn)
-    ours = pairs["detector"].str.startswith("closerange") & (pairs["metric"] == "AP")
-    tables = {"metrics": metrics, "differences": pairs[ours]}
+    ours = pairs["detector"].str.startswith(_OURS) & (pairs["metric"] == "AP")
+    tables = {"metrics": metrics, "differences": pairs[ours], "ablations": ablations(metrics)}
     if whole:
         # Near is cut from other images.
         kept = [subset for subset in folders if subset != "near"]
