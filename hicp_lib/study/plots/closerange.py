@@ -37,10 +37,19 @@ def training_curve(curve: pd.DataFrame) -> Figure:
 @in_style
 def ablations(table: pd.DataFrame) -> Figure:
     """Average precision of variants; `table` from `trained`, columns `variant, subset, group` and bounds."""
+    return _variants("ablations", table)
+
+
+@in_style
+def resolutions(table: pd.DataFrame) -> Figure:
+    """Average precision in enlarged pictures; `table` as of `ablations`."""
+    return _variants("resolutions", table)
+
+
+def _variants(name: str, table: pd.DataFrame) -> Figure:
     pens = marks.subset_dots(table["subset"].unique())
     figure, _, panels = marks.dot_chart(table, "variant", "subset", pens, WIDTH_IN, ["group"])
     for axis, _, group in panels:
         axis.set(xlabel="average precision", xlim=(0, None))
         axis.set_title({"body": "bodies", "hand": "both hands"}[group])
-    whole = table[table["variant"] == table["variant"].iloc[0]]
-    return Figure(figure, *texts("ablations", said=whole), table)
+    return Figure(figure, *texts(name, said=table[table["variant"] == table["variant"].iloc[0]]), table)
