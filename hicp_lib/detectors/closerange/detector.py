@@ -23,7 +23,7 @@ from hicp_lib.detectors.onnx.fitting import Regions
 from hicp_lib.detectors.onnx.session import open_committed, open_model
 
 _PRESENT = 0.5
-_HAND_SIDE = 2.0  # of a hand's square, in extents of its points; those trained on are 1.3 to 3
+_HAND_SIDE = 2.4  # of a hand's square, in extents of its points; those trained on are 1.3 to 3
 _LEAST_PX = 12  # extent of a hand that is looked at again
 
 
