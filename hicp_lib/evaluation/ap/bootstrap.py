@@ -38,7 +38,7 @@ def bootstrap_intervals(
     Figures
         Of every metric; NaN if no person is evaluated, and no interval from fewer than `MIN_DRAWN` clusters.
     """
-    return intervals(evaluation.metrics(), resample([evaluation], draws, clusters)[0])
+    return intervals(evaluation.metrics(), resample([evaluation], draws, clusters)[0], evaluation.n_people)
 
 
 def difference(a: Evaluation, b: Evaluation, of_a: Samples, of_b: Samples) -> Figures:
@@ -105,8 +105,11 @@ def _samples(matches: cocoeval.Matches, weights: Sequence[np.ndarray], place: np
     return {name: np.concatenate([np.zeros(0), *(part[name] for part in parts)]) for name in cocoeval.METRICS}
 
 
-def intervals(values: Mapping[str, float], samples: Samples) -> Figures:
+def intervals(values: Mapping[str, float], samples: Samples, n_people: int = 0) -> Figures:
     """Values by metric, with percentiles over the draws (`resample`) that have evaluated people.
+
+    AP is at most the share of people found. So with the number of people (not of differences), AP and AR of 0
+    or 1 have the interval of such a share (`with_interval`).
 
     Examples
     --------
@@ -114,4 +117,5 @@ def intervals(values: Mapping[str, float], samples: Samples) -> Figures:
     >>> [round(float(x), 3) for x in low_high]
     [0.5, 0.405, 0.595]
     """
-    return {name: with_interval(np.append(value, samples[name])) for name, value in values.items()}
+    drawn = {name: np.append(value, samples[name]) for name, value in values.items()}
+    return {name: with_interval(of, n_frames=n_people) for name, of in drawn.items()}

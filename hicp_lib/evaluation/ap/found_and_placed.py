@@ -30,11 +30,11 @@ def found_and_placed(people: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFra
         nobody is found), `low, high` (95 %, over source images), `n` (people), `n_images`.
     """
     by = ["subset", "group", "detector"]
-    is_found = people["oks"] >= MATCH_OKS
-    well = (people["oks"] >= _WELL_PLACED_OKS).astype(float).where(is_found)
-    measures = {FOUND: is_found.astype(float), OKS_OF_FOUND: people["oks"].where(is_found), WELL_PLACED: well}
-    valued = ((what, people.assign(value=values)) for what, values in measures.items())
-    tables = [proportions(rows, by, "value", draws).assign(what=what) for what, rows in valued]
+    people = people.assign(value=people["oks"] >= MATCH_OKS)
+    found = people[people["value"]]
+    well_placed = found.assign(value=found["oks"] >= _WELL_PLACED_OKS)
+    measures = {FOUND: people, OKS_OF_FOUND: found.assign(value=found["oks"]), WELL_PLACED: well_placed}
+    tables = [proportions(rows, by, "value", draws).assign(what=what) for what, rows in measures.items()]
     everyone = tables[0][by].merge(pd.DataFrame({"what": list(measures)}), how="cross")
     table = everyone.merge(pd.concat(tables), how="left", on=[*by, "what"])
     return table.fillna({"n": 0, "n_images": 0}).astype({"n": int, "n_images": int})

@@ -93,7 +93,7 @@ def _rows(
     samples = resample(evaluations, draws, clusters)
     step: Any = (np.nan,) * 3
     for k, (variant, run) in enumerate(runs.items()):
-        ap = intervals(evaluations[k].metrics(), samples[k])["AP"]
+        ap = intervals(evaluations[k].metrics(), samples[k], evaluations[k].n_people)["AP"]
         if k:
             step = difference(evaluations[k], evaluations[k - 1], samples[k], samples[k - 1])["AP"]
         counts = _counts(people, run, baseline, clusters)
@@ -115,4 +115,6 @@ def _with_interval(counts: np.ndarray, of: int, per: int, draws: Draws) -> tuple
     if not counts[:, per].sum():
         return np.nan, np.nan, np.nan
     some, whole = (draw_counts(len(counts), draws) @ counts)[:, [of, per]].T
-    return with_interval(np.divide(some, whole, out=np.full(len(whole), np.nan), where=whole > 0))
+    n_images = 0 if per else np.count_nonzero(counts[:, per])  # the found hands are a share of all hands only
+    ratios = np.divide(some, whole, out=np.full(len(whole), np.nan), where=whole > 0)
+    return with_interval(ratios, n_frames=n_images)

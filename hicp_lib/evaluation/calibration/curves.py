@@ -214,9 +214,9 @@ def reliability(
     """
     sums = _sums(scores, hits, groups)
     count, score_sum, _ = sums.sum(axis=0)
-    drawn = _resampled(sums, draws)
+    drawn, n_groups = _resampled(sums, draws), np.count_nonzero(sums[:, 0], axis=0)
     with np.errstate(invalid="ignore"):
-        rate, low, high = with_interval(drawn[:, 2] / drawn[:, 0])
+        rate, low, high = with_interval(drawn[:, 2] / drawn[:, 0], n_frames=n_groups)
         columns = {"score": score_sum / count, "rate": rate, "low": low, "high": high}
     table = pd.DataFrame({"bin": np.arange(N_BINS), **columns, "count": count.astype(int)})
     return table[count > 0].reset_index(drop=True)

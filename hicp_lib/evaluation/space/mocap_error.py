@@ -136,7 +136,7 @@ def median_errors(
         found, known = np.isfinite(found_m), part["reference_x_m"].notna().to_numpy()
         n_people = len(set(_subjects(part)[known]))
         medians = with_interval(weighted_median(found_m, weights), n_people)
-        shares = with_interval(_shares(weights, found, known), n_people)
+        shares = with_interval(_shares(weights, found, known), n_people, -(-known.sum() // block_frames))
         centre_m = part["centre_error_m"].where(part["score"] > case[-1]).median()
         rows.append((*case, found.sum(), known.sum(), n_people, *medians, *shares, centre_m, block_frames))
     numbers = [
@@ -214,13 +214,13 @@ def distance_shares(
         Columns `detector, method, keypoint, min_score, threshold_m, value, low, high, n_people`; NaN where
         none was found.
     """
-    rows = []
+    rows, block_frames = [], _block_length(errors)
     for case, part, found_m, weights in _cases(errors, min_scores, draws):
         of = np.isfinite(found_m) if beyond else part["reference_x_m"].notna().to_numpy()
         n_people = len(set(_subjects(part)[of]))
         for threshold_m in thresholds_m:
             hits = found_m > threshold_m if beyond else found_m <= threshold_m
-            interval = with_interval(_shares(weights, hits, of), n_people)
+            interval = with_interval(_shares(weights, hits, of), n_people, -(-of.sum() // block_frames))
             rows.append((*case, threshold_m, *interval, n_people))
     columns = [*_CASE, "min_score", "threshold_m", "value", "low", "high", "n_people"]
     return pd.DataFrame(rows, columns=columns)

@@ -47,12 +47,12 @@ def implausible(lifted: LiftedViews, draws: Draws = Draws()) -> pd.DataFrame:
         radians; `of_truth`, the same for the true keypoints (NaN if unknown).
     """
     rows = []
-    for measure, (values_of, parts, columns) in _MEASURES.items():
+    for measure, (values_of, kind, parts, columns) in _MEASURES.items():
         for case, part, subjects, found, true in lifted.cases(parts, columns):
             values = values_of(found)
             seen = np.flatnonzero(np.isfinite(values))
             whose = subjects[seen]
-            interval = mean_with_interval(values[seen], seen, draws, whose)
+            interval = mean_with_interval(values[seen].astype(kind), seen, draws, whose)
             of_truth = np.nan if true is None else np.nanmean(values_of(true))
             rows.append((*case, part, measure, *interval, len(seen), len(set(whose)), of_truth))
     return pd.DataFrame(rows, columns=[*ROW, "value", "low", "high", "n_images", "n_people", "of_truth"])
@@ -92,8 +92,10 @@ def _tilt_rad(shoulders_m: np.ndarray) -> np.ndarray:
 
 
 _TRUNKS = {f"{side} hip": (f"{side}_shoulder", f"{side}_hip") for side in ("left", "right")}
-_MEASURES: dict[str, tuple[Callable[[np.ndarray], np.ndarray], Parts, Sequence[str]]] = {
-    "hips in the abdomen": (_short, _TRUNKS, POSITION),
-    "broken fingers": (backwards, {part: PARTS[part] for part in ("left hand", "right hand")}, PIXEL),
-    "shoulder line tilt [rad]": (_tilt_rad, {"shoulders": ("left_shoulder", "right_shoulder")}, POSITION),
+_HANDS = {part: PARTS[part] for part in ("left hand", "right hand")}
+_SHOULDERS = {"shoulders": ("left_shoulder", "right_shoulder")}
+_MEASURES: dict[str, tuple[Callable[[np.ndarray], np.ndarray], type, Parts, Sequence[str]]] = {
+    "hips in the abdomen": (_short, bool, _TRUNKS, POSITION),
+    "broken fingers": (backwards, bool, _HANDS, PIXEL),
+    "shoulder line tilt [rad]": (_tilt_rad, float, _SHOULDERS, POSITION),
 }

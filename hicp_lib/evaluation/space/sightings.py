@@ -121,8 +121,9 @@ def similar_views(
         moves_m = pd.DataFrame(np.linalg.norm(found_m[a] - found_m[b], axis=-1)).median(axis=1).to_numpy()
         moved, moved_m = np.isfinite(moves_m), weighted_median(moves_m, together)
         for measure, drawn, count in (("flicker rate", rate, either), ("moves [m]", moved_m, moved)):
-            n_people = len(set(whose[a[count]]))
-            interval = with_interval(drawn, n_people if n_people > 1 or len(set(whose)) == 1 else 0)
+            n_people, alone = len(set(whose[a[count]])), len(set(whose)) == 1
+            n_images = len(np.union1d(a[count], b[count])) if measure == "flicker rate" else 0
+            interval = with_interval(drawn, n_people if n_people > 1 or alone else 0, n_images)
             rows.append((*case, part, measure, *interval, count.sum(), n_people))
     return pd.DataFrame(rows, columns=[*ROW, "value", "low", "high", "n", "n_people"])
 

@@ -171,7 +171,7 @@ def within_distance(
         off_m = np.linalg.norm(found_m - (own_medians(found_m, whose) if true_m is None else true_m), axis=-1)
         within = (off_m[..., None] <= np.asarray(thresholds_m)).mean(axis=1)
         shares = weights @ within / weights.sum(axis=1, keepdims=True)
-        bounds = zip(thresholds_m, *with_interval(shares, n_people), strict=True)
+        bounds = zip(thresholds_m, *with_interval(shares, n_people, len(whose)), strict=True)
         found = np.isfinite(off_m).mean()
         rows += [(*case, part, reference, *numbers, found, n_people) for numbers in bounds]
     columns = [*CASE, "part", "reference", "threshold_m", "value", "low", "high", "found", "n_people"]

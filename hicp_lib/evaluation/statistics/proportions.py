@@ -8,10 +8,9 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from hicp_lib.core.extras import needs
-from hicp_lib.evaluation.statistics.resampling import PERCENTILES, Draws, draw_counts, with_interval
+from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, with_interval
 
 ALPHA, POWER = 0.05, 0.8
-_TAIL = PERCENTILES[0] / 100  # probability outside an interval on either side
 
 
 def proportions(rows: pd.DataFrame, by: Sequence[str], of: str, draws: Draws = Draws()) -> pd.DataFrame:
@@ -106,9 +105,7 @@ def mean_with_interval(
 ) -> tuple[float, float, float]:
     """Mean, and its 95 % percentile interval from resampling subjects, then clusters of each.
 
-    If all flags are equal, they are so in every draw, but their share is not certain. Then the exact interval
-    of a share of 0 or 1 is used (Clopper and Pearson), where each subject counts once, or each cluster if
-    there is only one subject.
+    Booleans give a share, with an exact interval where it is 0 or 1 (`with_interval`).
 
     Parameters
     ----------
@@ -140,11 +137,8 @@ def mean_with_interval(
     whose = units["subject"][np.unique(cluster, return_index=True)[1]]
     times, n_people = draw_counts(whose, draws), whose.nunique()
     sums = np.bincount(cluster, weights=values.astype(float))
-    value, low, high = with_interval(times @ sums / (times @ np.bincount(cluster)), n_people)
-    if values.dtype == bool and value in (0, 1) and low == low:
-        reach = _TAIL ** (1 / (n_people if n_people > 1 else len(whose)))
-        low, high = (reach, 1.0) if value else (0.0, 1 - reach)
-    return value, low, high
+    n_clusters = len(whose) if values.dtype == bool else 0
+    return with_interval(times @ sums / (times @ np.bincount(cluster)), n_people, n_clusters)
 
 
 def variance_components(values: ArrayLike, subjects: ArrayLike) -> tuple[float, float]:

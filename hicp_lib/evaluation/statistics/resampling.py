@@ -99,8 +99,11 @@ def _draw_blocks(n: int, length: int, times: np.ndarray, rng: np.random.Generato
     return counts
 
 
-def with_interval(draws: np.ndarray, n_people: int = 1) -> tuple[Any, Any, Any]:
+def with_interval(draws: np.ndarray, n_people: int = 1, n_frames: ArrayLike = 0) -> tuple[Any, Any, Any]:
     """The value in the first draw, and the bounds of the 95 % percentile interval of the others.
+
+    A share of 0 or 1 is so in every draw, but it is not certain. Its interval is the exact one (Clopper and
+    Pearson), where each subject counts once, or each frame if there is only one subject.
 
     Parameters
     ----------
@@ -109,6 +112,9 @@ def with_interval(draws: np.ndarray, n_people: int = 1) -> tuple[Any, Any, Any]:
     n_people : int, optional
         Number of subjects: with several, the percentiles are those that make a mean's interval as wide as
         Student's. No interval with none, or with two to `MIN_DRAWN` - 1.
+    n_frames : int or array, shape (...), optional
+        For shares: what was resampled of one subject; no interval from fewer than `MIN_DRAWN`. By default the
+        draws are no shares.
 
     Returns
     -------
@@ -119,12 +125,20 @@ def with_interval(draws: np.ndarray, n_people: int = 1) -> tuple[Any, Any, Any]:
     --------
     >>> [float(x) for x in with_interval(np.array([0.5, 0.0, 1.0, np.nan]))]
     [0.5, 0.025, 0.975]
+    >>> [round(float(x), 3) for x in with_interval(np.zeros(1000), n_people=12, n_frames=96)]
+    [0.0, 0.0, 0.265]
     """
     others = draws[1:]
     bounds = np.full((2, *draws.shape[1:]), np.nan)
-    some = np.isfinite(others).any(axis=0) & (n_people == 1 or n_people >= MIN_DRAWN)
+    is_share = np.greater(n_frames, 0)
+    n_units = np.where(n_people == 1, n_frames, n_people)
+    enough = (n_units >= MIN_DRAWN) | (~is_share & (n_people == 1))
+    some = np.isfinite(others).any(axis=0) & enough
     bounds[:, some] = np.nanpercentile(others[:, some], _percentiles(n_people), axis=0)
-    return draws[0], *bounds
+    exact, reach = some & is_share, (PERCENTILES[0] / 100) ** (1 / np.maximum(n_units, 1))
+    low = np.where(exact & (draws[0] == 1), reach, bounds[0])
+    high = np.where(exact & (draws[0] == 0), 1 - reach, bounds[1])
+    return draws[0], low[()], high[()]
 
 
 @memoised()

@@ -19,16 +19,15 @@ from hicp_lib.simulation.rendering.surfaces import Surface
 
 @contextmanager
 def _without_dash() -> Iterator[None]:
-    """Half of the time of Open3D's import is Dash's, which only its plots in a browser need."""
-    if "dash" in sys.modules:
-        yield
-        return
-    sys.modules["dash"] = stand_in = ModuleType("dash")
+    """Half of the time of Open3D's import is Dash's, for plots in a browser, which do not start then."""
+    stand_in = ModuleType("dash")
     stand_in.__dict__.update(html=None, dcc=None, Dash=None)
+    used = sys.modules.setdefault("dash", stand_in)
     try:
         yield
     finally:
-        del sys.modules["dash"]
+        if used is stand_in:
+            del sys.modules["dash"]
 
 
 # Otherwise Open3D starts its web viewer in every notebook that renders.

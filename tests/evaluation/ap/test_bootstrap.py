@@ -117,3 +117,10 @@ def test_nobody_there_gives_no_interval(annotated):
         nobody, matches=replace(nobody.matches, image_ids=np.zeros(0, int), n_people=np.zeros(0, int))
     )
     assert np.isnan(list(bootstrap_intervals(no_images, Draws(10)).values())).all()
+
+
+def test_that_nobody_is_found_is_not_certain_of_others(annotated, detected):
+    nobody = found_or_not(annotated, detected, np.zeros(40, dtype=bool))
+    assert bootstrap_intervals(nobody, Draws(50))["AP"] == pytest.approx((0, 0, 1 - 0.025 ** (1 / 40)))
+    everybody = found_or_not(annotated, detected, np.ones(40, dtype=bool))
+    assert bootstrap_intervals(everybody, Draws(50))["AR"] == pytest.approx((1, 0.025 ** (1 / 40), 1))

@@ -42,3 +42,9 @@ def test_intervals_hold_the_value_and_are_of_source_images():
     assert (
         found_and_placed(together, Draws(200))["low"].isna().all()
     )  # two images say nothing of their spread
+
+
+def test_all_found_and_none_well_placed_is_not_certain():
+    table = found_and_placed(people([0.5] * 40), Draws(50)).set_index("what")
+    assert table.loc[FOUND, ["low", "value", "high"]].tolist() == pytest.approx([0.025 ** (1 / 40), 1, 1])
+    assert table.loc[OKS_OF_FOUND, ["low", "high"]].tolist() == [0.5, 0.5]  # a mean, not a share

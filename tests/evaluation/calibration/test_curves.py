@@ -97,11 +97,14 @@ def test_calibration_error_by_hand():
 
 
 def test_reliability_has_a_row_per_bin_in_use():
-    scores = np.repeat([0.05, 0.05, 0.55, 1.0], 3)
-    table = reliability(scores, np.repeat([0, 1, 1, 1], 3), np.arange(12), draws=Draws(50))
-    assert table["bin"].tolist() == [0, 5, 9] and table["count"].tolist() == [6, 3, 3]
+    times = (12, 12, 12, 3)
+    scores, hits = np.repeat([0.05, 0.05, 0.55, 1.0], times), np.repeat([0, 1, 1, 1], times)
+    table = reliability(scores, hits, np.arange(39), draws=Draws(50))
+    assert table["bin"].tolist() == [0, 5, 9] and table["count"].tolist() == [24, 12, 3]
     assert table["rate"].tolist() == [0.5, 1, 1]
-    assert (table["low"] <= table["rate"]).all() and (table["rate"] <= table["high"]).all()
+    assert (table["low"] < table["rate"])[:2].all() and (table["rate"] <= table["high"])[:2].all()
+    assert table.loc[1, "low"] == pytest.approx(0.025 ** (1 / 12)) and table.loc[1, "high"] == 1
+    assert table.loc[2, ["low", "high"]].isna().all()  # three pictures
 
 
 def crooked(n: int = 4000, seed: int = 0) -> pd.DataFrame:

@@ -112,3 +112,16 @@ def test_people_are_drawn_who_have_such_bodies():
     row = table.set_index(["measure", "part"]).loc["hips in the abdomen", "left hip"]
     assert row["value"] == pytest.approx(1 / 3) and (row["n_images"], row["n_people"]) == (60, 12)
     assert row["high"] - row["low"] > 0.45  # of twelve, not of sixty
+
+
+def test_that_nobody_has_it_is_not_certain_of_others():
+    n_people, n_frames = 12, 4
+    frames = range(n_people * n_frames)
+    points = pd.concat([rows_of(body(), k) for k in frames])
+    whose = {"upper": np.repeat(np.arange(n_people), n_frames)}
+    table = implausible(LiftedViews(points, whose), draws=Draws(50)).set_index("measure")
+    hips = table.loc["hips in the abdomen"]
+    assert (hips["value"] == 0).all() and (hips["low"] == 0).all()
+    assert hips["high"].to_numpy() == pytest.approx(1 - 0.025 ** (1 / n_people))
+    tilt = table.loc["shoulder line tilt [rad]"]
+    assert tilt["value"] == tilt["high"] == 0  # an angle, not a share

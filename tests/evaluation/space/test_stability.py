@@ -243,3 +243,11 @@ def test_intervals_of_distances_need_ten_people_in_whom_it_is_found(n_found, kno
         LiftedViews(points[points["frame"] < 10], {"upper": np.zeros(10, int)}), draws=Draws(200)
     )
     assert alone.set_index("part").loc["left wrist", "spread_m_low"] > 0
+
+
+def test_a_share_of_all_or_none_is_not_certain():
+    shares = within_distance(LiftedViews(*of_people(0.0)), [0.0, 9.0], Draws(50))
+    shares = shares[shares["part"] == "left wrist"]
+    shares = shares.groupby("threshold_m")[["value", "low", "high"]].first()
+    assert shares.loc[9.0].tolist() == pytest.approx([1, 0.025 ** (1 / 12), 1])
+    assert shares.loc[0.0].tolist() == pytest.approx([0, 0, 1 - 0.025 ** (1 / 12)])

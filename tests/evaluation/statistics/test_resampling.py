@@ -214,3 +214,14 @@ def test_of_several_people_a_length_is_as_of_one():
     alone = [block_length(autoregressive(0.9, 480, seed)) for seed in range(8)]
     assert min(alone) <= together <= max(alone)
     assert block_length(series[:480], np.zeros(480)) == alone[0]
+
+
+def test_a_share_of_nought_or_one_has_the_exact_interval_of_its_people():
+    draws = np.tile([0.0, 1.0, 0.5], (21, 1))
+    _, low, high = with_interval(draws, 12, n_frames=96)
+    reach = 0.025 ** (1 / 12)
+    assert low.tolist() == pytest.approx([0, reach, 0.5])
+    assert high.tolist() == pytest.approx([1 - reach, 1, 0.5])
+    assert with_interval(draws[:, 0], 1, n_frames=20)[2] == pytest.approx(1 - 0.025 ** (1 / 20))
+    for n_people, n_frames in ((1, 9), (9, 90), (0, 90)):
+        assert np.isnan(with_interval(draws, n_people, n_frames)[1:]).all()

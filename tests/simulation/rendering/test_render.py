@@ -1,5 +1,8 @@
 """Rendering against geometry that can be worked out by hand."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -165,3 +168,13 @@ def test_a_board_in_front_occludes_what_lies_behind_it(person):
 def test_what_is_outside_the_image_is_outside(person):
     pixels, seen = _seen(person, [], [1.0, 0, 1.5], (0, 0, 1.5))
     assert seen["left_ankle"] == 0 and pixels[INDEX["left_ankle"], 1] > 639.5
+
+
+def test_the_renderer_starts_without_dash_which_stays_whole_for_others():
+    code = (
+        "import sys, hicp_lib.simulation.rendering.raycast\n"
+        "assert not [name for name in sys.modules if name.split('.')[0] == 'dash']\n"
+        "import dash\n"
+        "assert callable(dash.Dash)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

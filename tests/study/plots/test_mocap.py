@@ -130,7 +130,7 @@ def test_marks_lie_at_the_errors_and_gains_in_centimetres():
     assert "wrists, paper lifting: skin depth with 3.0 cm" in figure.alt
     assert "would show: 0.4 cm" in figure.caption and figure.table["view"].nunique() == 2
     assert (
-        "12 people" in figure.caption
+        "people: 12" in figure.caption
         and "the paper's best medians" in figure.caption
         and "made up" in figure.caption
     )
