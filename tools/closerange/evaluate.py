@@ -7,7 +7,8 @@ By default on the held-out people of the full study: Basic, Headless and Near. `
 of development identities (seed 900003), to choose by. `--photographs CHECKOUT`: on the photographs of
 `tools/photographs.py`, where only bodies are judged. Writes TABLES/metrics.csv (average precision of bodies,
 hands and single hands), TABLES/differences.csv (every network less every other detector),
-TABLES/ablations.csv (the networks alone, by their names) and TABLES/extended.csv (by extended OKS).
+TABLES/ablations.csv (the networks alone, by their names) and TABLES/extended.csv (by extended OKS); of
+photographs only TABLES/photographs.csv, like differences.csv. The first network is called "closerange".
 """
 
 from __future__ import annotations
@@ -22,10 +23,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import pandas as pd
 from photographs import make_subsets  # noqa: E402
 
+from closerange.detector import CloseRange  # noqa: E402
+from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.files import cache_dir
+from hicp_lib.core.images import read_image
 from hicp_lib.datasets.subsets import create_hicp
 from hicp_lib.detectors.runtime.results import detections_of
-from hicp_lib.detectors.runtime.run import time_dataset
+from hicp_lib.detectors.runtime.run import boxes_by_image, time_dataset
 from hicp_lib.evaluation.ap import metric_table
 from hicp_lib.evaluation.failures.presence import extended_table
 from hicp_lib.evaluation.statistics.resampling import Draws
@@ -40,7 +44,7 @@ OTHERS = (
     "combined:movenet-thunder+mediapipe-hands", "combined:mediapipe-pose+mediapipe-hands",
 )  # fmt: skip
 """What networks are held against; of the combinations with all looks (notebook 02b)."""
-_OURS = "closerange, "
+OURS = "closerange"
 _ALL_LOOKS = {"looks": "wrists+mirrored+image+along"}
 
 
@@ -60,28 +64,36 @@ def development(n_scenes: int) -> tuple[dict[str, Path], Path]:
     return {subset: folder / "hicp" / subset for subset in ("basic", "headless")}, annotations
 
 
-def detect(folders: dict[str, Path], others: tuple, models: dict[str, list[str]], no_look: bool) -> dict:
-    """Detections by subset and detector, then by image."""
-    found = {}
-    for subset, folder in folders.items():
-        for name in others:
-            options = _ALL_LOOKS if name.startswith("combined:") else {}
-            found[subset, name] = detections_of(time_dataset(name, folder, **options))
-        for name, (model, hand_model) in models.items():
-            looks = {_OURS + name: True}
-            if no_look:
-                looks[f"{_OURS}{name}, one look"] = False
-            for label, look in looks.items():
-                run = time_dataset("closerange", folder, model=model, hand_model=hand_model, look_again=look)
-                found[subset, label] = detections_of(run)
-    return found
+def networks(models: dict[str, list[str]], ways: bool) -> dict[str, Detector]:
+    """Detectors by name; with `ways`, the first one also without its second look, and without presence."""
+    made: dict[str, Detector] = {f"{OURS}, {name}": CloseRange(*files) for name, files in models.items()}
+    first = next(iter(models.values()))
+    made = {OURS: CloseRange(*first)} | dict(list(made.items())[1:])
+    if ways:
+        made[f"{OURS}, without a second look at hands"] = CloseRange(*first, look_again=False)
+        made[f"{OURS}, without presence in its scores"] = CloseRange(*first, presence=False)
+    return made
 
 
-def ablations(metrics: pd.DataFrame) -> pd.DataFrame:
+def detect(detector: Detector, folder: Path) -> dict[int, Detections]:
+    """A detector that the library does not know, on a data set."""
+    people = read_annotations(folder / "annotations.json")
+    boxes_px = boxes_by_image(people)
+    images = {i: folder / "images" / image.file_name for i, image in people.images.items()}
+    return {i: detector.detect(read_image(path), boxes_px[i]) for i, path in images.items()}
+
+
+def detect_others(name: str, folder: Path) -> dict[int, Detections]:
+    """What a network is held against, on a data set."""
+    options = _ALL_LOOKS if name.startswith("combined:") else {}
+    return detections_of(time_dataset(name, folder, **options))
+
+
+def ablations(metrics: pd.DataFrame, first: str) -> pd.DataFrame:
     """Average precision of networks, by the names they were given."""
-    ours = metrics["detector"].str.startswith(_OURS) & (metrics["metric"] == "AP")
+    ours = metrics["detector"].str.startswith(OURS) & (metrics["metric"] == "AP")
     of = metrics[ours & metrics["group"].isin(["body", "hand"])]
-    variants = of["detector"].str.removeprefix(_OURS)
+    variants = of["detector"].str.removeprefix(OURS).str.removeprefix(", ").replace("", first)
     return of.assign(variant=variants)[["variant", "subset", "group", "value", "low", "high"]]
 
 
@@ -90,7 +102,7 @@ def main() -> None:
     parser.add_argument("models", nargs="+", help="NAME=PEOPLE.onnx,HANDS.onnx")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--development", type=int, default=0, metavar="N")
-    parser.add_argument("--no-look", action="store_true", help="also without a second look at hands")
+    parser.add_argument("--ways", action="store_true", help="also without a second look, without presence")
     parser.add_argument("--photographs", type=Path, metavar="CHECKOUT")
     arguments = parser.parse_args()
     given = dict(text.split("=", 1) for text in arguments.models)
@@ -103,17 +115,23 @@ def main() -> None:
         else:
             folders, whole = development(arguments.development) if arguments.development else held_out()
         truth = {subset: read_annotations(folder / "annotations.json") for subset, folder in folders.items()}
-        found = detect(folders, others, models, arguments.no_look)
+        found = {(s, name): detect_others(name, of) for s, of in folders.items() for name in others}
+        for name, network in networks(models, arguments.ways).items():
+            found |= {(subset, name): detect(network, of) for subset, of in folders.items()}
     draws = Draws(1000, 0)
     drawn = metric_table.draw_cases(truth, found, draws, groups)
     metrics, pairs = metric_table.metric_table(drawn), metric_table.pairs(drawn)
-    ours = pairs["detector"].str.startswith(_OURS) & (pairs["metric"] == "AP")
-    tables = {"metrics": metrics, "differences": pairs[ours], "ablations": ablations(metrics)}
-    if whole:
-        # Near is cut from other images.
-        kept = [subset for subset in folders if subset != "near"]
-        of_whole = {case: run for case, run in found.items() if case[0] in kept}
-        bodies = {case: of for case, of in drawn.items() if case[0] in kept and case[2] == "body"}
+    ours = pairs[(pairs["detector"] == OURS) & (pairs["metric"] == "AP") & pairs["other"].isin(others)]
+    if whole is None:
+        tables = {"photographs": ours}
+    else:
+        first = next(iter(models))
+        compared = [OURS, *others]
+        told = metrics[metrics["detector"].isin(compared)]
+        tables = {"metrics": told, "differences": ours, "ablations": ablations(metrics, first)}
+        kept = [subset for subset in folders if subset != "near"]  # Near is cut from other images
+        of_whole = {(s, d): run for (s, d), run in found.items() if s in kept and d in compared}
+        bodies = {case: drawn[case] for case in drawn if case[:2] in of_whole and case[2] == "body"}
         known = {subset: truth[subset] for subset in kept}
         tables["extended"] = extended_table(known, of_whole, read_annotations(whole), bodies, draws)
     arguments.out.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
 """Whether small people are found better in enlarged pictures, as the paper proposes (section V).
 
-    python tools/closerange/resolution.py FOLDER NAME=PEOPLE.onnx,HANDS.onnx --out TABLES [--steps 3000]
+    python tools/closerange/resolution.py FOLDER PEOPLE.onnx HANDS.onnx --out TABLES [--steps 3000]
 
 Crops of held-out people are made three times smaller. Then they are enlarged again: by interpolation, and by
 a small network that was trained on rendered pictures of development people (FOLDER/scenes of
@@ -25,10 +25,10 @@ from torch.nn import functional
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from closerange.detector import CloseRange  # noqa: E402
 from closerange.evaluate import held_out  # noqa: E402
 from hicp_lib.core.images import read_image  # noqa: E402
-from hicp_lib.detectors.runtime.results import detections_of  # noqa: E402
-from hicp_lib.detectors.runtime.run import boxes_by_image, detect_images  # noqa: E402
+from hicp_lib.detectors.registry import make_detector  # noqa: E402
 from hicp_lib.evaluation.ap import metric_table  # noqa: E402
 from hicp_lib.evaluation.statistics.resampling import Draws  # noqa: E402
 from hicp_lib.formats.annotations import read_annotations  # noqa: E402
@@ -107,14 +107,15 @@ def by_interpolation(image: np.ndarray) -> np.ndarray:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("model", help="NAME=PEOPLE.onnx,HANDS.onnx")
+    parser.add_argument("model", type=Path)
+    parser.add_argument("hand_model", type=Path)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--steps", type=int, default=3000)
     arguments = parser.parse_args()
-    name, files = arguments.model.split("=", 1)
-    model, hand_model = files.split(",")
-    detectors = {name: ("closerange", {"model": model, "hand_model": hand_model}),
-                 "movenet-lightning": ("movenet-lightning", {})}  # fmt: skip
+    detectors = {
+        "closerange": CloseRange(arguments.model, arguments.hand_model),
+        "movenet-lightning": make_detector("movenet-lightning"),
+    }
     network = trained(sorted((arguments.folder / "scenes" / "images").glob("*.jpg")), arguments.steps)
     ways: dict[str, Enlarge | None] = {
         "interpolated": by_interpolation, "by a small network": by_network(network), "as rendered": None,
@@ -128,9 +129,8 @@ def main() -> None:
         }
         for way, enlarge in ways.items():
             shown = {i: enlarge(smaller(image)) if enlarge else image for i, image in images.items()}
-            for detector, (kind, options) in detectors.items():
-                run = detect_images(kind, shown, boxes_px=boxes_by_image(people), **options)
-                found[subset, f"{detector}, {way}"] = detections_of(run)
+            for name, detector in detectors.items():
+                found[subset, f"{name}, {way}"] = {i: detector.detect(image) for i, image in shown.items()}
     table = metric_table.metric_table(metric_table.draw_cases(truth, found, Draws(1000, 0)))
     table = table[table["metric"] == "AP"].rename(columns={"detector": "variant"})
     table = table[["variant", "subset", "group", "value", "low", "high"]].dropna(subset="value")

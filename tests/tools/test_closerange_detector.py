@@ -3,9 +3,9 @@
 import cv2
 import numpy as np
 import pytest
+from closerange import detector
 
 from hicp_lib.core.keypoints import LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
-from hicp_lib.detectors.closerange import detector
 
 SIDE_PX, ROUGH_PX = 192, 7
 CENTRES_PX = {"left": (290, 120), "right": (110, 250)}
@@ -100,6 +100,11 @@ def test_what_is_in_the_picture_counts_from_a_half(monkeypatch, image):
 
     scores = made(monkeypatch, mixed, look_again=False)[0].detect(image).scores[0]
     assert (scores[1::2] >= 0.5).all() and (scores[::2] < 0.5).all()
+
+
+def test_without_presence_a_point_scores_by_how_sure_its_place_is(monkeypatch, image):
+    closerange, _ = made(monkeypatch, lambda _: person(present=0.2), look_again=False, presence=False)
+    np.testing.assert_allclose(closerange.detect(image).scores, 0.9, atol=1e-6)
 
 
 def test_each_box_is_a_person(monkeypatch, image):
