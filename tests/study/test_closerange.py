@@ -3,9 +3,10 @@
 import pandas as pd
 import pytest
 
-from hicp_lib.core.images import read_image
+from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.failures.presence import MEASURES
 from hicp_lib.study.closerange import FOLDER, criteria, trained
+from hicp_lib.study.plots.closerange import pictures
 
 LIGHTNING, HANDS = "movenet-lightning", "combined:movenet-thunder+mediapipe-hands"
 
@@ -24,7 +25,7 @@ def differences(**values):
 
 
 def extended(ours=0.6, other=0.5):
-    rows = [("closerange, all", ours), (LIGHTNING, other), ("movenet-thunder", other - 0.1)]
+    rows = [("closerange", ours), (LIGHTNING, other), ("movenet-thunder", other - 0.1)]
     table = pd.DataFrame(rows, columns=["detector", "value"]).assign(subset="headless", measure=MEASURES[2])
     wrong = table.assign(measure=MEASURES[1], value=1 - table["value"])
     return pd.concat([table, wrong, table.assign(subset="basic", value=0.9)], ignore_index=True)
@@ -66,4 +67,15 @@ def test_what_is_kept_is_whole():
     assert {"body", "hand"} <= set(ablations["group"]) and ablations["variant"].nunique() > 3
     asked = criteria(trained("differences"), trained("extended"), trained("photographs"))
     assert asked["value"].notna().all()
-    assert read_image(FOLDER / "squares.jpg").shape[2] == 3
+    table = trained("pictures")
+    assert {"squares", "failures", "photograph"} == set(table["figure"])
+    assert {path.name for path in FOLDER.glob("*.jpg")} == set(table["file"])
+    for name in table["figure"].unique():
+        assert len(pictures(name).figure.axes) >= (table["figure"] == name).sum()
+
+
+def test_tables_of_another_training_are_read_and_missing_ones_named(tmp_path):
+    pd.DataFrame({"step": [500]}).to_csv(tmp_path / "curve.csv", index=False)
+    assert trained("curve", tmp_path)["step"].tolist() == [500]
+    with pytest.raises(InputError, match="metrics.csv: is not there; tools/closerange writes it"):
+        trained("metrics", tmp_path)

@@ -59,7 +59,7 @@ def made(monkeypatch, whole, hand=brightest, **options):
 
 
 def test_hands_are_looked_at_again_each_as_a_right_one(monkeypatch, image):
-    image[82:92, 250:280] = 255  # left above the left hand, not in the middle of its square
+    image[72:82, 250:280] = 255  # left above the left hand, not in the middle of its square
     closerange, hands = made(monkeypatch, lambda _: person(), lambda s: brightest(s * inner(s)))
     found = closerange.detect(image)
     for side, points in HANDS.items():
