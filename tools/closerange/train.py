@@ -35,7 +35,6 @@ CHECK_STEPS = 500
 BATCH, RATE, DECAY, WARM_UP = 32, 2e-3, 1e-4, 100
 SIGMA_CELLS = 1.0
 BODY_WEIGHT, FACE_WEIGHT, ANSWER_WEIGHT = 2.0, 0.2, 2.0
-AVERAGE = 0.998  # of the running mean of the weights
 MIXED = 0.3  # parameter of how features are mixed
 GROUPS = {"body": COCO_17, "face": FACE, "hand": HANDS}
 
@@ -122,7 +121,7 @@ def start(options: argparse.Namespace) -> tuple[CloseRange, dict]:
     network = CloseRange(LIGHTNING, options.squares, options.width).to(memory_format=torch.channels_last)
     network.tail.requires_grad_(options.tail_rate > 0)
     average = torch.optim.swa_utils.AveragedModel(
-        network, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(AVERAGE), use_buffers=True
+        network, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(options.average), use_buffers=True
     )
     rest = [parameter for name, parameter in network.named_parameters() if not name.startswith("tail.")]
     tail = {"params": list(network.tail.parameters()), "lr": RATE * options.tail_rate}
@@ -146,7 +145,7 @@ def train(options: argparse.Namespace) -> None:
     weights = keypoint_weights()[keypoints]
     network, parts = start(options)
     numbers = {name: value for name, value in vars(options).items() if name not in ("folder", "out")} | {
-        "batch": BATCH, "rate": RATE, "decay": DECAY, "average": AVERAGE,
+        "batch": BATCH, "rate": RATE, "decay": DECAY,
         "body_weight": BODY_WEIGHT, "face_weight": FACE_WEIGHT, "answer_weight": ANSWER_WEIGHT,
         "n_training": len(training), "n_checking": len(checking), "squares_sha256": squares_sha256(squares),
         "held_back": sorted(set(truth["body"][checking])), "torch": torch.__version__,
@@ -202,6 +201,7 @@ def main() -> None:
     )
     parser.add_argument("--restyle", type=float, default=0.5, help="share of squares with mixed features")
     parser.add_argument("--hidden-weight", type=float, default=0.3, help="of hidden points' positions")
+    parser.add_argument("--average", type=float, default=0.998, help="of the running mean of the weights")
     parser.add_argument("--share", type=float, default=1.0, help="of the squares, for the learning curve")
     parser.add_argument("--views", default="", help="kinds of squares of people, joined by +; all of them")
     train(parser.parse_args())
