@@ -1,29 +1,17 @@
 """The network for close range: what its training and its evaluation left behind (`tools/closerange`)."""
 
-from pathlib import Path
-
 import pandas as pd
 
 from hicp_lib.core.datafiles import REFERENCE_DIR
-from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.failures.presence import MEASURES
 
 FOLDER = REFERENCE_DIR / "closerange"
 _COMBINED = "combined:"
 
 
-def trained(table: str, folder: str | Path = "") -> pd.DataFrame:
-    """A table of `tools/closerange`, such as "metrics", from a folder or of the study's own training.
-
-    Raises
-    ------
-    InputError
-        If the folder lacks it.
-    """
-    path = Path(folder or FOLDER) / f"{table}.csv"
-    if not path.is_file():
-        raise InputError(f"{path}: is not there; tools/closerange writes it")
-    return pd.read_csv(path)
+def trained(table: str) -> pd.DataFrame:
+    """A table of `tools/closerange`: curve, differences, extended, photographs, ablations or resolutions."""
+    return pd.read_csv(FOLDER / f"{table}.csv")
 
 
 def criteria(differences: pd.DataFrame, extended: pd.DataFrame, photographs: pd.DataFrame) -> pd.DataFrame:

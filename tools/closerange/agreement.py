@@ -20,10 +20,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from closerange.detector import CloseRange  # noqa: E402
 from hicp_lib.core.images import read_image  # noqa: E402
 from hicp_lib.core.keypoints import COCO_17, INDEX, SIGMAS  # noqa: E402
 from hicp_lib.core.oks import oks_terms  # noqa: E402
+from hicp_lib.detectors.closerange.detector import CloseRange  # noqa: E402
 from hicp_lib.detectors.registry import make_detector  # noqa: E402
 
 MIN_PIXELS, SURE, LEAST = 10_000, 0.4, {"basic": 6, "headless": 4}

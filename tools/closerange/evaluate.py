@@ -23,11 +23,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import pandas as pd
 from photographs import make_subsets  # noqa: E402
 
-from closerange.detector import CloseRange  # noqa: E402
 from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.files import cache_dir
 from hicp_lib.core.images import read_image
 from hicp_lib.datasets.subsets import create_hicp
+from hicp_lib.detectors.closerange.detector import CloseRange
 from hicp_lib.detectors.runtime.results import detections_of
 from hicp_lib.detectors.runtime.run import boxes_by_image, time_dataset
 from hicp_lib.evaluation.ap import metric_table
@@ -76,7 +76,7 @@ def networks(models: dict[str, list[str]], ways: bool) -> dict[str, Detector]:
 
 
 def detect(detector: Detector, folder: Path) -> dict[int, Detections]:
-    """A detector that the library does not know, on a data set."""
+    """A network on a data set."""
     people = read_annotations(folder / "annotations.json")
     boxes_px = boxes_by_image(people)
     images = {i: folder / "images" / image.file_name for i, image in people.images.items()}

@@ -25,9 +25,9 @@ from torch.nn import functional
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from closerange.detector import CloseRange  # noqa: E402
 from closerange.evaluate import held_out  # noqa: E402
 from hicp_lib.core.images import read_image  # noqa: E402
+from hicp_lib.detectors.closerange.detector import CloseRange  # noqa: E402
 from hicp_lib.detectors.registry import make_detector  # noqa: E402
 from hicp_lib.evaluation.ap import metric_table  # noqa: E402
 from hicp_lib.evaluation.statistics.resampling import Draws  # noqa: E402

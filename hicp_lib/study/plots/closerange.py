@@ -1,11 +1,9 @@
 """Figures of the network for close range: squares it learnt from, its training, what its parts are worth."""
 
-from pathlib import Path
-
 import pandas as pd
 
 from hicp_lib.core.images import read_image
-from hicp_lib.study.closerange import FOLDER, trained
+from hicp_lib.study.closerange import FOLDER
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import STYLES
 from hicp_lib.study.plots.people import picture_grid
@@ -15,16 +13,10 @@ _CURVES = {"body": "bodies", "hand": "hands", "face": "faces", "in_picture_right
 _STYLES = dict(zip(_CURVES, ("o-", "s--", "^:", "D-."), strict=True))
 
 
-def pictures(name: str, folder: str | Path = "") -> Figure:
-    """Pictures of "squares" it was trained on, of "failures", or of a "photograph" (`draw_pictures.py`)."""
-    table = trained("pictures", folder).query("figure == @name")
-    shown = [read_image(Path(folder or FOLDER) / file) for file in table["file"]]
-    grid = [[shown[k] for k in rows] for rows in table.groupby("row").indices.values()]
-    said = list(dict.fromkeys(table["title"].dropna()))
-    cell_in = min(COLUMN_IN, WIDTH_IN / len(grid[0]))
-    return picture_grid(
-        grid, *texts(name, said=said), titles=table["title"].fillna(""), cell_in=cell_in, title_pt=7
-    )
+def squares() -> Figure:
+    """Squares that it was trained on, with the truth."""
+    picture = read_image(FOLDER / "squares.jpg")
+    return picture_grid([[picture]], *texts("squares"), cell_in=COLUMN_IN)
 
 
 @in_style

@@ -1,13 +1,12 @@
 """The network for close range: 136 keypoints of one person per box, each with whether it is in the picture.
 
-MoveNet Lightning's layers, and the decoder of `network.py`. Each box (by default the whole image) is scaled
+MoveNet Lightning's layers, and a decoder trained on rendered people of development identities, near, cut off
+and without heads (`tools/closerange`, which made the file). Each box (by default the whole image) is scaled
 to a square, padded with black. The network gives for each keypoint its position in the square, the term of
 OKS to expect there, and the probabilities that it is in the picture and that it is visible.
 
 Hands are small in such a square, so a second network of the same kind looks at each of them again, in a
-square of its own. It knows right hands; left ones are mirrored. It takes what the library's own detectors
-take, and gives what they give; it is not among them, since it has not reached what was asked of it (page
-`08_closerange_network`).
+square of its own. It knows right hands; left ones are mirrored.
 """
 
 from pathlib import Path
@@ -21,7 +20,7 @@ from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS
 from hicp_lib.detectors.combined.hand_squares import HAND_POINTS
 from hicp_lib.detectors.onnx.box_source import BoxOptions, BoxSource
 from hicp_lib.detectors.onnx.fitting import Regions
-from hicp_lib.detectors.onnx.session import open_model
+from hicp_lib.detectors.onnx.session import open_committed, open_model
 
 _PRESENT = 0.5
 _HAND_SIDE = 2.4  # of a hand's square, in extents of its points; those trained on are 1.3 to 3
@@ -33,8 +32,8 @@ class CloseRange:
 
     Parameters
     ----------
-    model, hand_model : str or Path
-        Files that `export.py` wrote.
+    model, hand_model : str or Path, optional
+        Other files that `tools/closerange/export.py` wrote.
     padding : float
         Factor by which boxes are enlarged before they become squares.
     look_again : bool
@@ -49,11 +48,14 @@ class CloseRange:
     name = "closerange"
 
     def __init__(
-        self, model: str | Path, hand_model: str | Path, padding: float = 1.0, look_again: bool = True,
-        presence: bool = True, **person_boxes: Unpack[BoxOptions],
+        self, model: str | Path | None = None, hand_model: str | Path | None = None, padding: float = 1.0,
+        look_again: bool = True, presence: bool = True, **person_boxes: Unpack[BoxOptions],
     ) -> None:  # fmt: skip
         self._boxes = BoxSource(**person_boxes)
-        self._model, self._hand_model = (open_model(of, **self._boxes.run) for of in (model, hand_model))
+        run, ours = self._boxes.run, {f"{self.name}.onnx": model, f"{self.name}-hands.onnx": hand_model}
+        self._model, self._hand_model = (
+            open_model(of, **run) if of else open_committed(file, **run) for file, of in ours.items()
+        )
         self._padding, self._looks_again, self._presence = padding, look_again, presence
         self.takes_boxes = self._boxes.kind == "gt"
         self.settings: dict[str, Any] = {"padding": padding, "look_again": look_again, "presence": presence}

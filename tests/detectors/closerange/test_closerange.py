@@ -1,11 +1,18 @@
-"""The detector for close range, with stand-ins for its two networks."""
+"""The detector for close range, with stand-ins for its two networks, and its files."""
+
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from closerange import detector
 
-from hicp_lib.core.keypoints import LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import read_json
+from hicp_lib.core.images import read_image
+from hicp_lib.core.keypoints import INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
+from hicp_lib.detectors.closerange import detector
+from hicp_lib.detectors.onnx.session import open_committed
+from hicp_lib.detectors.registry import make_detector
 
 SIDE_PX, ROUGH_PX = 192, 7
 CENTRES_PX = {"left": (290, 120), "right": (110, 250)}
@@ -113,3 +120,24 @@ def test_each_box_is_a_person(monkeypatch, image):
     found = closerange.detect(image, boxes)
     expected = person()[:, :2] * 200 / SIDE_PX
     np.testing.assert_allclose(found.keypoints_px, [expected, expected + [200, 100]], atol=1e-3)
+
+
+@pytest.mark.parametrize("name, of", [("closerange", "people"), ("closerange-hands", "hands")])
+def test_the_files_give_what_was_trained(name, of):
+    """PyTorch's answers for the photograph, as the export wrote them."""
+    expected = np.array(read_json(Path(__file__).with_name(f"expected_{of}.json")))
+    image = read_image(DATA_DIR / "photograph.jpg")
+    square = cv2.resize(image, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_AREA)
+    (found,) = open_committed(f"{name}.onnx").run(cv2.dnn.blobFromImage(square))
+    off_px = np.linalg.norm(found[0, :, :2] - expected[:, :2], axis=1)
+    assert np.median(off_px) < 0.1 and np.quantile(off_px, 0.9) < 0.5
+    np.testing.assert_allclose(found[0, :, 2:], expected[:, 2:], atol=0.02)
+
+
+def test_a_portrait_has_a_head_and_no_legs():
+    image = read_image(DATA_DIR / "photograph.jpg")
+    found, lightning = (make_detector(name).detect(image) for name in ("closerange", "movenet-lightning"))
+    legs = [INDEX[f"{side}_{joint}"] for side in ("left", "right") for joint in ("knee", "ankle")]
+    assert (found.scores[0, :5] > 0.5).all() and (found.scores[0, legs] < 0.5).all()
+    off_px = np.linalg.norm(found.keypoints_px[0, :5] - lightning.keypoints_px[0, :5], axis=1)
+    assert off_px.max() < 0.05 * image.shape[0]
