@@ -1,14 +1,15 @@
 """Evaluate networks for close range, and what they are held against, on rendered people.
 
     python tools/closerange/evaluate.py NAME=PEOPLE.onnx,HANDS.onnx [...] --out TABLES [--development N]
-                                        [--photographs CHECKOUT] [--no-look]
+                                        [--photographs CHECKOUT] [--ways]
 
 By default on the held-out people of the full study: Basic, Headless and Near. `--development N`: on N scenes
 of development identities (seed 900003), to choose by. `--photographs CHECKOUT`: on the photographs of
 `tools/photographs.py`, where only bodies are judged. Writes TABLES/metrics.csv (average precision of bodies,
-hands and single hands), TABLES/differences.csv (every network less every other detector),
-TABLES/ablations.csv (the networks alone, by their names) and TABLES/extended.csv (by extended OKS); of
-photographs only TABLES/photographs.csv, like differences.csv. The first network is called "closerange".
+hands and single hands), TABLES/differences.csv (the first network less every other detector),
+TABLES/extended.csv (by extended OKS) and TABLES/ablations.csv (the networks alone, by their names); of
+photographs only TABLES/photographs.csv, like differences.csv. The first network is called "closerange" in the
+others; `--ways` adds it to the ablations without its second look at hands, and without presence.
 """
 
 from __future__ import annotations
