@@ -52,6 +52,17 @@ def test_people_seen_from_near():
     assert f"Of {who}, {shares}, with average precision {ap[0]:.2f} and {ap[1]:.2f}." in README
 
 
+def test_the_network_for_close_range():
+    table = pd.read_csv(REFERENCE_DIR / "closerange" / "metrics.csv").query("metric == 'AP'")
+    headless = table[table["subset"] == "headless"].set_index(["group", "detector"])["value"]
+    hands = headless["hand"]
+    best = hands[hands.index.str.startswith("combined:")].max()
+    ours, theirs = headless["body", "closerange"], headless["body", "movenet-lightning"]
+    assert f"(`closerange`) has {ours:.2f} on headless bodies, where MoveNet Lightning" in README
+    assert f"is built, has {theirs:.2f}, and {hands['closerange']:.2f} on their hands" in README
+    assert f"where the best combination has {best:.2f}." in README
+
+
 def test_distances_in_space():
     floor_cm = read_json(FULL / "04_mocap_3d" / "values.json")["floor_cm"]
     theirs = {joint: medians_cm("paper", joint) for joint in ("wrist", "elbow")}

@@ -98,19 +98,25 @@ def find(folder: Path, name: str) -> Path | None:
     return same[0] if len(same) == 1 else None
 
 
+def make_subsets(checkout: Path, folder: Path) -> tuple[dict[str, Path], pd.DataFrame]:
+    """Cut the people out: the subsets' folders, and a table of the photographs."""
+    data = checkout / "tests" / "data"
+    if not data.is_dir():
+        sys.exit(f"{data}: is not a folder; give a checkout of github.com/open-mmlab/mmpose")
+    joined = folder / "joined"
+    (joined / "images").mkdir(parents=True)
+    people, images = join(data, joined / "images")
+    write_annotations(joined / "annotations.json", people)
+    create_hicp(joined / "annotations.json", joined / "images", folder / "hicp", MIN_PIXELS)
+    return {subset: folder / "hicp" / subset for subset in SUBSETS}, images
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("checkout", type=Path, help="of github.com/open-mmlab/mmpose")
-    data = parser.parse_args().checkout / "tests" / "data"
-    if not data.is_dir():
-        sys.exit(f"{data}: is not a folder; give a checkout of github.com/open-mmlab/mmpose")
+    checkout = parser.parse_args().checkout
     with tempfile.TemporaryDirectory() as folder:
-        joined = Path(folder, "joined")
-        (joined / "images").mkdir(parents=True)
-        people, images = join(data, joined / "images")
-        write_annotations(joined / "annotations.json", people)
-        create_hicp(joined / "annotations.json", joined / "images", Path(folder, "hicp"), MIN_PIXELS)
-        folders = {subset: Path(folder, "hicp", subset) for subset in SUBSETS}
+        folders, images = make_subsets(checkout, Path(folder))
         truth = {subset: read_annotations(of / "annotations.json") for subset, of in folders.items()}
         names = [name for name in default_detector_names() if "body" in DETECTORS[name].groups]
         runs = {(s, d): time_dataset(d, of) for s, of in folders.items() for d in names}

@@ -76,6 +76,7 @@ _CLASSES = {
     "hicp_lib.detectors.mediapipe.tasks": "MediaPipePose MediaPipeHands MediaPipe",
     "hicp_lib.detectors.movenet.networks": "MoveNetThunder MoveNetLightning MoveNetMultiPose",
     "hicp_lib.detectors.posenet.detector": "PoseNetMobileNet",
+    "hicp_lib.detectors.closerange.detector": "CloseRange",
     "hicp_lib.detectors.openpose.networks": "OpenPoseMobileNet OpenPose",
     "hicp_lib.detectors.onnx.mmpose": "MMPose",
     "hicp_lib.detectors.onnx.alphapose": "AlphaPose",

@@ -107,7 +107,7 @@ def test_what_cannot_be_combined_is_refused(name, match):
 
 def test_what_each_detector_can_be_scored_on():
     both = {name for name, entry in DETECTORS.items() if entry.groups == ("body", "hand")}
-    assert both == {"mediapipe", "openpose", "mmpose", "alphapose"}
+    assert both == {"mediapipe", "closerange", "openpose", "mmpose", "alphapose"}
     assert DETECTORS["mediapipe-hands"].groups == ("hand",)
     assert all(entry.name == name for name, entry in DETECTORS.items())
     assert all(DETECTORS[name].groups == ("body",) for name in set(DETECTORS) - both - {"mediapipe-hands"})

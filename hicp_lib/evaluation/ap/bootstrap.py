@@ -108,8 +108,21 @@ def _samples(matches: cocoeval.Matches, weights: Sequence[np.ndarray], place: np
 def intervals(values: Mapping[str, float], samples: Samples, n_people: int = 0) -> Figures:
     """Values by metric, with percentiles over the draws (`resample`) that have evaluated people.
 
-    AP is at most the share of people found. So with the number of people (not of differences), AP and AR of 0
-    or 1 have the interval of such a share (`with_interval`).
+    AP is at most the share of people found, so AP and AR of 0 or 1 have the interval of such a share
+    (`with_interval`).
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        By metric.
+    samples : Samples
+        Of the same metrics.
+    n_people : int, optional
+        How many are evaluated; none for differences, which are no shares.
+
+    Returns
+    -------
+    Figures
 
     Examples
     --------

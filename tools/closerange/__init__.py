@@ -1,0 +1,1 @@
+"""Training of a network for people at close range: samples, network, training, export."""

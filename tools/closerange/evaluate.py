@@ -1,0 +1,149 @@
+"""Evaluate networks for close range, and what they are held against, on rendered people.
+
+    python tools/closerange/evaluate.py NAME=PEOPLE.onnx,HANDS.onnx [...] --out TABLES [--development N]
+                                        [--photographs CHECKOUT] [--ways]
+
+By default on the held-out people of the full study: Basic, Headless and Near. `--development N`: on N scenes
+of development identities (seed 900003), to choose by. `--photographs CHECKOUT`: on the photographs of
+`tools/photographs.py`, where only bodies are judged. Writes TABLES/metrics.csv (average precision of bodies,
+hands and single hands), TABLES/differences.csv (the first network less every other detector),
+TABLES/extended.csv (by extended OKS) and TABLES/ablations.csv (the networks alone, by their names); of
+photographs only TABLES/photographs.csv, like differences.csv. The first network is called "closerange" in the
+others; `--ways` adds it to the ablations without its second look at hands, and without presence.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import pandas as pd
+from photographs import make_subsets  # noqa: E402
+
+from hicp_lib.core.detections import Detections, Detector
+from hicp_lib.core.files import cache_dir
+from hicp_lib.core.images import read_image
+from hicp_lib.datasets.subsets import create_hicp
+from hicp_lib.detectors.closerange.detector import CloseRange
+from hicp_lib.detectors.runtime.results import detections_of
+from hicp_lib.detectors.runtime.run import boxes_by_image, time_dataset
+from hicp_lib.evaluation.ap import metric_table
+from hicp_lib.evaluation.failures.presence import extended_table
+from hicp_lib.evaluation.statistics.resampling import Draws
+from hicp_lib.formats.annotations import read_annotations
+from hicp_lib.simulation.world.scenes import render_dataset
+from hicp_lib.study.sources import open_near, open_source
+
+DEVELOPMENT_SEED, MIN_PIXELS = 900_003, 20_000
+BODIES = ("movenet-lightning", "movenet-thunder")
+OTHERS = (
+    *BODIES, "mediapipe",
+    "combined:movenet-thunder+mediapipe-hands", "combined:mediapipe-pose+mediapipe-hands",
+)  # fmt: skip
+"""What networks are held against; of the combinations with all looks (notebook 02b)."""
+OURS = "closerange"
+_ALL_LOOKS = {"looks": "wrists+mirrored+image+along"}
+
+
+def held_out() -> tuple[dict[str, Path], Path]:
+    """Folders of the full study's data sets, and the annotations of the whole images."""
+    data = open_source()
+    near = open_near(data, 96, 0, MIN_PIXELS)
+    return data.subsets | {"near": near.basic}, data.annotations
+
+
+def development(n_scenes: int) -> tuple[dict[str, Path], Path]:
+    """As `held_out`, of development identities."""
+    folder = cache_dir() / f"closerange_development_{n_scenes}"
+    render_dataset(folder / "scenes", n_scenes, DEVELOPMENT_SEED, split="development")
+    annotations = folder / "scenes" / "annotations.json"
+    create_hicp(annotations, folder / "scenes" / "images", folder / "hicp", MIN_PIXELS)
+    return {subset: folder / "hicp" / subset for subset in ("basic", "headless")}, annotations
+
+
+def networks(models: dict[str, list[str]], ways: bool) -> dict[str, Detector]:
+    """Detectors by name; with `ways`, the first one also without its second look, and without presence."""
+    made: dict[str, Detector] = {f"{OURS}, {name}": CloseRange(*files) for name, files in models.items()}
+    first = next(iter(models.values()))
+    made = {OURS: CloseRange(*first)} | dict(list(made.items())[1:])
+    if ways:
+        made[f"{OURS}, without a second look at hands"] = CloseRange(*first, look_again=False)
+        made[f"{OURS}, without presence in its scores"] = CloseRange(*first, presence=False)
+    return made
+
+
+def detect(detector: Detector, folder: Path) -> dict[int, Detections]:
+    """A network on a data set."""
+    people = read_annotations(folder / "annotations.json")
+    boxes_px = boxes_by_image(people)
+    images = {i: folder / "images" / image.file_name for i, image in people.images.items()}
+    return {i: detector.detect(read_image(path), boxes_px[i]) for i, path in images.items()}
+
+
+def detect_others(name: str, folder: Path) -> dict[int, Detections]:
+    """What a network is held against, on a data set."""
+    options = _ALL_LOOKS if name.startswith("combined:") else {}
+    return detections_of(time_dataset(name, folder, **options))
+
+
+def ablations(metrics: pd.DataFrame, first: str) -> pd.DataFrame:
+    """Average precision of networks, by the names they were given."""
+    ours = metrics["detector"].str.startswith(OURS) & (metrics["metric"] == "AP")
+    of = metrics[ours & metrics["group"].isin(["body", "hand"])]
+    variants = of["detector"].str.removeprefix(OURS).str.removeprefix(", ").replace("", first)
+    return of.assign(variant=variants)[["variant", "subset", "group", "value", "low", "high"]]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("models", nargs="+", help="NAME=PEOPLE.onnx,HANDS.onnx")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--development", type=int, default=0, metavar="N")
+    parser.add_argument("--ways", action="store_true", help="also without a second look, without presence")
+    parser.add_argument("--photographs", type=Path, metavar="CHECKOUT")
+    arguments = parser.parse_args()
+    given = dict(text.split("=", 1) for text in arguments.models)
+    models = {name: files.split(",") for name, files in given.items()}
+    groups, others = metric_table.GROUPS_OF_OBJECTS, OTHERS
+    with tempfile.TemporaryDirectory() as place:
+        if arguments.photographs:
+            folders, whole = make_subsets(arguments.photographs, Path(place))[0], None
+            groups, others = ("body",), BODIES
+        else:
+            folders, whole = development(arguments.development) if arguments.development else held_out()
+        truth = {subset: read_annotations(folder / "annotations.json") for subset, folder in folders.items()}
+        found = {(s, name): detect_others(name, of) for s, of in folders.items() for name in others}
+        for name, network in networks(models, arguments.ways).items():
+            found |= {(subset, name): detect(network, of) for subset, of in folders.items()}
+    draws = Draws(1000, 0)
+    drawn = metric_table.draw_cases(truth, found, draws, groups)
+    metrics, pairs = metric_table.metric_table(drawn), metric_table.pairs(drawn)
+    ours = pairs[(pairs["detector"] == OURS) & (pairs["metric"] == "AP") & pairs["other"].isin(others)]
+    if whole is None:
+        tables = {"photographs": ours}
+    else:
+        first = next(iter(models))
+        compared = [OURS, *others]
+        told = metrics[metrics["detector"].isin(compared)]
+        tables = {"metrics": told, "differences": ours, "ablations": ablations(metrics, first)}
+        kept = [subset for subset in folders if subset != "near"]  # Near is cut from other images
+        of_whole = {(s, d): run for (s, d), run in found.items() if s in kept and d in compared}
+        bodies = {case: drawn[case] for case in drawn if case[:2] in of_whole and case[2] == "body"}
+        known = {subset: truth[subset] for subset in kept}
+        tables["extended"] = extended_table(known, of_whole, read_annotations(whole), bodies, draws)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    for name, table in tables.items():
+        table.to_csv(arguments.out / f"{name}.csv", index=False, float_format="%.4f", lineterminator="\n")
+    ap = metrics[metrics["metric"] == "AP"]
+    print(ap.pivot_table(index=["group", "detector"], columns="subset", values="value").round(3).to_string())
+    for table in [of for name, of in tables.items() if name == "extended"]:
+        rows = table.pivot_table(index="detector", columns=["subset", "measure"], values="value")
+        print(rows.round(3).to_string())
+
+
+if __name__ == "__main__":
+    main()
