@@ -114,6 +114,7 @@ def main() -> None:
     images = np.random.default_rng(0).uniform(0, 255, (N_CHECKED, 1, 3, SIDE_PX, SIDE_PX)).astype(np.float32)
     first = onnxruntime.InferenceSession(frozen_layers(LIGHTNING, names).SerializeToString())
     whole = onnxruntime.InferenceSession(model)
+
     def expected_of(image: np.ndarray) -> np.ndarray:
         kept = [torch.from_numpy(of) for of in first.run(names, {"image": image})]
         with torch.no_grad():
