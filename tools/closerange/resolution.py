@@ -1,6 +1,6 @@
 """Whether small people are found better in enlarged pictures, as the paper proposes (section V).
 
-    python tools/closerange/resolution.py FOLDER PEOPLE.onnx HANDS.onnx --out TABLES [--steps 3000]
+    python tools/closerange/resolution.py FOLDER PEOPLE.onnx HANDS.onnx --out TABLES [--steps 1500]
 
 Crops of held-out people are made three times smaller. Then they are enlarged again: by interpolation, and by
 a small network that was trained on rendered pictures of development people (FOLDER/scenes of
@@ -110,7 +110,7 @@ def main() -> None:
     parser.add_argument("model", type=Path)
     parser.add_argument("hand_model", type=Path)
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--steps", type=int, default=3000)
+    parser.add_argument("--steps", type=int, default=1500)
     arguments = parser.parse_args()
     detectors = {
         "closerange": CloseRange(arguments.model, arguments.hand_model),
