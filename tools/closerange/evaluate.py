@@ -67,13 +67,12 @@ def development(n_scenes: int) -> tuple[dict[str, Path], Path]:
 
 def networks(models: dict[str, list[str]], ways: bool) -> dict[str, Detector]:
     """Detectors by name; with `ways`, the first one also without its second look, and without presence."""
-    made: dict[str, Detector] = {f"{OURS}, {name}": CloseRange(*files) for name, files in models.items()}
-    first = next(iter(models.values()))
-    made = {OURS: CloseRange(*first)} | dict(list(made.items())[1:])
+    (_, first), *others = models.items()
+    made: dict[str, Detector] = {OURS: CloseRange(*first)}
     if ways:
         made[f"{OURS}, without a second look at hands"] = CloseRange(*first, look_again=False)
         made[f"{OURS}, without presence in its scores"] = CloseRange(*first, presence=False)
-    return made
+    return made | {f"{OURS}, {name}": CloseRange(*files) for name, files in others}
 
 
 def detect(detector: Detector, folder: Path) -> dict[int, Detections]:

@@ -50,6 +50,6 @@ def _variants(name: str, table: pd.DataFrame) -> Figure:
     pens = marks.subset_dots(table["subset"].unique())
     figure, _, panels = marks.dot_chart(table, "variant", "subset", pens, WIDTH_IN, ["group"])
     for axis, _, group in panels:
-        axis.set(xlabel="average precision", xlim=(0, None))
+        axis.set(xlabel="average precision")
         axis.set_title({"body": "bodies", "hand": "both hands"}[group])
     return Figure(figure, *texts(name, said=table[table["variant"] == table["variant"].iloc[0]]), table)
