@@ -38,7 +38,7 @@ def bootstrap_intervals(
     Figures
         Of every metric; NaN if no person is evaluated, and no interval from fewer than `MIN_DRAWN` clusters.
     """
-    return intervals(evaluation.metrics(), resample([evaluation], draws, clusters)[0], evaluation.n_people)
+    return intervals(evaluation.metrics(), resample([evaluation], draws, clusters)[0], evaluation)
 
 
 def difference(a: Evaluation, b: Evaluation, of_a: Samples, of_b: Samples) -> Figures:
@@ -105,7 +105,7 @@ def _samples(matches: cocoeval.Matches, weights: Sequence[np.ndarray], place: np
     return {name: np.concatenate([np.zeros(0), *(part[name] for part in parts)]) for name in cocoeval.METRICS}
 
 
-def intervals(values: Mapping[str, float], samples: Samples, n_people: int = 0) -> Figures:
+def intervals(values: Mapping[str, float], samples: Samples, of: Evaluation | None = None) -> Figures:
     """Values by metric, with percentiles over the draws (`resample`) that have evaluated people.
 
     AP is at most the share of people found, so AP and AR of 0 or 1 have the interval of such a share
@@ -117,8 +117,9 @@ def intervals(values: Mapping[str, float], samples: Samples, n_people: int = 0) 
         By metric.
     samples : Samples
         Of the same metrics.
-    n_people : int, optional
-        How many are evaluated; none for differences, which are no shares.
+    of : Evaluation, optional
+        Whose values they are; none for differences, which are no shares. People, or hands, of one image
+        count once.
 
     Returns
     -------
@@ -130,5 +131,6 @@ def intervals(values: Mapping[str, float], samples: Samples, n_people: int = 0) 
     >>> [round(float(x), 3) for x in low_high]
     [0.5, 0.405, 0.595]
     """
+    n_images = min(of.n_people, of.n_images) if of else 0
     drawn = {name: np.append(value, samples[name]) for name, value in values.items()}
-    return {name: with_interval(of, n_frames=n_people) for name, of in drawn.items()}
+    return {name: with_interval(each, n_frames=n_images) for name, each in drawn.items()}

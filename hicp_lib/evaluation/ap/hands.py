@@ -93,7 +93,7 @@ def _rows(
     samples = resample(evaluations, draws, clusters)
     step: Any = (np.nan,) * 3
     for k, (variant, run) in enumerate(runs.items()):
-        ap = intervals(evaluations[k].metrics(), samples[k], evaluations[k].n_people)["AP"]
+        ap = intervals(evaluations[k].metrics(), samples[k], evaluations[k])["AP"]
         if k:
             step = difference(evaluations[k], evaluations[k - 1], samples[k], samples[k - 1])["AP"]
         counts = _counts(people, run, baseline, clusters)

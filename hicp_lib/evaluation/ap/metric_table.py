@@ -85,7 +85,7 @@ def metric_table(drawn: Drawn) -> pd.DataFrame:
     rows = [
         (subset, group, its.options.labelled, detector, metric, *figure, its.n_people)
         for (subset, detector, group), (its, samples) in drawn.items()
-        for metric, figure in intervals(its.metrics(), samples, its.n_people).items()
+        for metric, figure in intervals(its.metrics(), samples, its).items()
     ]
     return pd.DataFrame(rows, columns=columns)
 

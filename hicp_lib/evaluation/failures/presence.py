@@ -141,7 +141,7 @@ def extended_table(
         if (subset, detector, "body") in drawn:
             given, decided = (counted[subset, f"{detector}, {way}", "body"] for way in ("given", "decided"))
             cases = (drawn[subset, detector, "body"], given, decided)
-            figures = [(intervals(of.metrics(), samples, of.n_people), of) for of, samples in cases]
+            figures = [(intervals(of.metrics(), samples, of), of) for of, samples in cases]
             figures.append((difference(decided[0], given[0], decided[1], given[1]), given[0]))
             for measure, (figure, of) in zip(MEASURES, figures, strict=True):
                 rows.append((subset, detector, measure, *figure["AP"], of.n_people))
