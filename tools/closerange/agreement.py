@@ -11,20 +11,16 @@ of MoveNet Lightning, below which no training should bring a network.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
-from hicp_lib.core.images import read_image  # noqa: E402
-from hicp_lib.core.keypoints import COCO_17, INDEX, SIGMAS  # noqa: E402
-from hicp_lib.core.oks import oks_terms  # noqa: E402
-from hicp_lib.detectors.closerange.detector import CloseRange  # noqa: E402
-from hicp_lib.detectors.registry import make_detector  # noqa: E402
+from hicp_lib.core.images import read_image
+from hicp_lib.core.keypoints import COCO_17, INDEX, SIGMAS
+from hicp_lib.core.oks import oks_terms
+from hicp_lib.detectors.registry import make_detector
 
 MIN_PIXELS, SURE, LEAST = 10_000, 0.4, {"basic": 6, "headless": 4}
 _MARGIN = 0.15  # of a person's extent, around its points
@@ -95,7 +91,7 @@ def main() -> None:
     detectors = {"movenet-lightning": make_detector("movenet-lightning")}
     for name, files in (text.split("=", 1) for text in arguments.models):
         model, hand_model = files.split(",")
-        detectors[name] = CloseRange(model, hand_model, look_again=False)
+        detectors[name] = make_detector("closerange", model=model, hand_model=hand_model, look_again=False)
     people = list(cases(arguments.photographs))
     for subset in LEAST:
         of_subset = [case for case in people if case.subset == subset]

@@ -18,19 +18,17 @@ import argparse
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import pandas as pd
 from photographs import make_subsets  # noqa: E402
 
-from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.files import cache_dir
-from hicp_lib.core.images import read_image
 from hicp_lib.datasets.subsets import create_hicp
-from hicp_lib.detectors.closerange.detector import CloseRange
 from hicp_lib.detectors.runtime.results import detections_of
-from hicp_lib.detectors.runtime.run import boxes_by_image, time_dataset
+from hicp_lib.detectors.runtime.run import time_dataset
 from hicp_lib.evaluation.ap import metric_table
 from hicp_lib.evaluation.failures.presence import extended_table
 from hicp_lib.evaluation.statistics.resampling import Draws
@@ -65,28 +63,15 @@ def development(n_scenes: int) -> tuple[dict[str, Path], Path]:
     return {subset: folder / "hicp" / subset for subset in ("basic", "headless")}, annotations
 
 
-def networks(models: dict[str, list[str]], ways: bool) -> dict[str, Detector]:
-    """Detectors by name; with `ways`, the first one also without its second look, and without presence."""
-    (_, first), *others = models.items()
-    made: dict[str, Detector] = {OURS: CloseRange(*first)}
+def networks(models: dict[str, list[str]], ways: bool) -> dict[str, dict[str, Any]]:
+    """Options of the detector by name; with `ways`, the first also without its second look, and presence."""
+    of = {name: dict(zip(("model", "hand_model"), files, strict=True)) for name, files in models.items()}
+    first, *others = of
+    made = {OURS: of[first]}
     if ways:
-        made[f"{OURS}, without a second look at hands"] = CloseRange(*first, look_again=False)
-        made[f"{OURS}, without presence in its scores"] = CloseRange(*first, presence=False)
-    return made | {f"{OURS}, {name}": CloseRange(*files) for name, files in others}
-
-
-def detect(detector: Detector, folder: Path) -> dict[int, Detections]:
-    """A network on a data set."""
-    people = read_annotations(folder / "annotations.json")
-    boxes_px = boxes_by_image(people)
-    images = {i: folder / "images" / image.file_name for i, image in people.images.items()}
-    return {i: detector.detect(read_image(path), boxes_px[i]) for i, path in images.items()}
-
-
-def detect_others(name: str, folder: Path) -> dict[int, Detections]:
-    """What a network is held against, on a data set."""
-    options = _ALL_LOOKS if name.startswith("combined:") else {}
-    return detections_of(time_dataset(name, folder, **options))
+        made[f"{OURS}, without a second look at hands"] = of[first] | {"look_again": False}
+        made[f"{OURS}, without presence in its scores"] = of[first] | {"presence": False}
+    return made | {f"{OURS}, {name}": of[name] for name in others}
 
 
 def ablations(metrics: pd.DataFrame, first: str) -> pd.DataFrame:
@@ -115,9 +100,13 @@ def main() -> None:
         else:
             folders, whole = development(arguments.development) if arguments.development else held_out()
         truth = {subset: read_annotations(folder / "annotations.json") for subset, folder in folders.items()}
-        found = {(s, name): detect_others(name, of) for s, of in folders.items() for name in others}
-        for name, network in networks(models, arguments.ways).items():
-            found |= {(subset, name): detect(network, of) for subset, of in folders.items()}
+        runs = {name: (name, _ALL_LOOKS if name.startswith("combined:") else {}) for name in others}
+        runs |= {name: (OURS, options) for name, options in networks(models, arguments.ways).items()}
+        found = {
+            (subset, name): detections_of(time_dataset(detector, folder, **options))
+            for subset, folder in folders.items()
+            for name, (detector, options) in runs.items()
+        }
     draws = Draws(1000, 0)
     drawn = metric_table.draw_cases(truth, found, draws, groups)
     metrics, pairs = metric_table.metric_table(drawn), metric_table.pairs(drawn)

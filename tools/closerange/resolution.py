@@ -27,8 +27,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from closerange.evaluate import held_out  # noqa: E402
 from hicp_lib.core.images import read_image  # noqa: E402
-from hicp_lib.detectors.closerange.detector import CloseRange  # noqa: E402
-from hicp_lib.detectors.registry import make_detector  # noqa: E402
+from hicp_lib.detectors.runtime.results import detections_of  # noqa: E402
+from hicp_lib.detectors.runtime.run import detect_images  # noqa: E402
 from hicp_lib.evaluation.ap import metric_table  # noqa: E402
 from hicp_lib.evaluation.statistics.resampling import Draws  # noqa: E402
 from hicp_lib.formats.annotations import read_annotations  # noqa: E402
@@ -113,8 +113,8 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=1500)
     arguments = parser.parse_args()
     detectors = {
-        "closerange": CloseRange(arguments.model, arguments.hand_model),
-        "movenet-lightning": make_detector("movenet-lightning"),
+        "closerange": {"model": arguments.model, "hand_model": arguments.hand_model},
+        "movenet-lightning": {},
     }
     network = trained(sorted((arguments.folder / "scenes" / "images").glob("*.jpg")), arguments.steps)
     ways: dict[str, Enlarge | None] = {
@@ -129,8 +129,8 @@ def main() -> None:
         }
         for way, enlarge in ways.items():
             shown = {i: enlarge(smaller(image)) if enlarge else image for i, image in images.items()}
-            for name, detector in detectors.items():
-                found[subset, f"{name}, {way}"] = {i: detector.detect(image) for i, image in shown.items()}
+            for name, options in detectors.items():
+                found[subset, f"{name}, {way}"] = detections_of(detect_images(name, shown, **options))
     table = metric_table.metric_table(metric_table.draw_cases(truth, found, Draws(1000, 0)))
     table = table[table["metric"] == "AP"].rename(columns={"detector": "variant"})
     table = table[["variant", "subset", "group", "value", "low", "high"]].dropna(subset="value")
