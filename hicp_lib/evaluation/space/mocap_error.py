@@ -132,11 +132,11 @@ def median_errors(
         joint's centre), `block_frames`.
     """
     rows, block_frames = [], _block_length(errors)
-    for case, part, found_m, weights in _cases(errors, min_scores, draws):
+    for case, part, found_m, weights in _cases(errors, min_scores, draws, block_frames):
         found, known = np.isfinite(found_m), part["reference_x_m"].notna().to_numpy()
         n_people = len(set(_subjects(part)[known]))
         medians = with_interval(weighted_median(found_m, weights), n_people)
-        shares = with_interval(_shares(weights, found, known), n_people, -(-known.sum() // block_frames))
+        shares = _share(weights, found, known, n_people, block_frames)
         centre_m = part["centre_error_m"].where(part["score"] > case[-1]).median()
         rows.append((*case, found.sum(), known.sum(), n_people, *medians, *shares, centre_m, block_frames))
     numbers = [
@@ -173,7 +173,7 @@ def median_differences(
     """
     labels = [*_CASE, "min_score"]
     k, rows, drawn, of_people = labels.index(between), [], {}, {}
-    for case, part, found_m, weights in _cases(errors, min_scores, draws):
+    for case, part, found_m, weights in _cases(errors, min_scores, draws, _block_length(errors)):
         drawn[case] = weighted_median(found_m, weights)
         of_people[case] = pd.Series(found_m).groupby(_subjects(part)).median()
     for case, medians_m in drawn.items():
@@ -215,23 +215,23 @@ def distance_shares(
         none was found.
     """
     rows, block_frames = [], _block_length(errors)
-    for case, part, found_m, weights in _cases(errors, min_scores, draws):
+    for case, part, found_m, weights in _cases(errors, min_scores, draws, block_frames):
         of = np.isfinite(found_m) if beyond else part["reference_x_m"].notna().to_numpy()
         n_people = len(set(_subjects(part)[of]))
         for threshold_m in thresholds_m:
             hits = found_m > threshold_m if beyond else found_m <= threshold_m
-            interval = with_interval(_shares(weights, hits, of), n_people, -(-of.sum() // block_frames))
+            interval = _share(weights, hits, of, n_people, block_frames)
             rows.append((*case, threshold_m, *interval, n_people))
     columns = [*_CASE, "min_score", "threshold_m", "value", "low", "high", "n_people"]
     return pd.DataFrame(rows, columns=columns)
 
 
 def _cases(
-    errors: pd.DataFrame, min_scores: Sequence[float], draws: Draws
+    errors: pd.DataFrame, min_scores: Sequence[float], draws: Draws, block_frames: int
 ) -> Iterator[tuple[tuple, pd.DataFrame, np.ndarray, np.ndarray]]:
     """Labels, rows, errors of found joints (n_frames,) and weights of frames, the same for all cases."""
-    whose, length = _subjects(errors.drop_duplicates("frame").sort_values("frame")), _block_length(errors)
-    weights = boot.draw_counts(whose, draws, length)
+    whose = _subjects(errors.drop_duplicates("frame").sort_values("frame"))
+    weights = boot.draw_counts(whose, draws, block_frames)
     for case, part in errors.groupby(_CASE, sort=False):
         part = part.sort_values("frame")
         for min_score in min_scores:
@@ -239,10 +239,13 @@ def _cases(
             yield (*case, min_score), part, found_m, weights
 
 
-def _shares(weights: np.ndarray, hits: np.ndarray, of: np.ndarray) -> np.ndarray:
-    """Share of some frames that are hits, in every draw; NaN where none of them was drawn."""
+def _share(
+    weights: np.ndarray, hits: np.ndarray, of: np.ndarray, n_people: int, block_frames: int
+) -> tuple[float, float, float]:
+    """Share of some frames that are hits, and its interval; draws without any of them are left out."""
     total = weights @ of
-    return np.where(total > 0, (weights @ (hits & of)) / np.maximum(total, 1), np.nan)
+    drawn = np.where(total > 0, (weights @ (hits & of)) / np.maximum(total, 1), np.nan)
+    return with_interval(drawn, n_people, -(-of.sum() // block_frames))
 
 
 def _subjects(errors: pd.DataFrame) -> np.ndarray:
