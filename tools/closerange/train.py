@@ -49,17 +49,12 @@ def targets(keypoints_px: torch.Tensor) -> torch.Tensor:
 
 
 def losses(
-    network: CloseRange,
-    features: list,
-    points_px: torch.Tensor,
-    seen: torch.Tensor,
-    weights: torch.Tensor,
-    hidden_weight: float,
+    network: CloseRange, features: list, points_px: torch.Tensor, seen: torch.Tensor, weights: torch.Tensor
 ) -> list:
     """Of positions, and of the two answers."""
     maps, answers = network(*features)
     there = seen > 0
-    weight = torch.where(seen == 2, 1.0, hidden_weight) * weights
+    weight = weights.expand(seen.shape)
     log_likely = maps.flatten(2)[there].log_softmax(dim=1)
     wrong = -(targets(points_px[there]) * log_likely).sum(dim=1)
     truth = torch.stack([there, seen == 2], dim=1).float()
@@ -166,7 +161,7 @@ def train(options: argparse.Namespace) -> None:
         )
         parts["optimizer"].zero_grad()
         given = restyled(_batch(features, rows), options.restyle)
-        wrong, answered = losses(network, given, true_px, seen, weights, options.hidden_weight)
+        wrong, answered = losses(network, given, true_px, seen, weights)
         (wrong + ANSWER_WEIGHT * answered).backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
         parts["optimizer"].step()
@@ -200,7 +195,6 @@ def main() -> None:
         "--tail-rate", type=float, default=0.1, help="of MoveNet's layers, as part of the rest's"
     )
     parser.add_argument("--restyle", type=float, default=0.5, help="share of squares with mixed features")
-    parser.add_argument("--hidden-weight", type=float, default=0.3, help="of hidden points' positions")
     parser.add_argument("--average", type=float, default=0.998, help="of the running mean of the weights")
     parser.add_argument("--share", type=float, default=1.0, help="of the squares, for the learning curve")
     parser.add_argument("--views", default="", help="kinds of squares of people, joined by +; all of them")
