@@ -12,12 +12,19 @@ from bs4 import BeautifulSoup
 
 MOST_BYTES = 1_200_000  # of a page with all it loads, but for 3D scenes
 SCENES = "plotly.js"
+# A page is judged as it stays: with its fonts, measured by its own script, colours no longer in transition.
 JUDGE = """
   const done = arguments[0];
-  axe.run({preload: false, resultTypes: ["violations"]}).then(
-    ({violations}) => done(violations.flatMap(({id, nodes}) => nodes.map(({html}) => `${id}: ${html}`))),
-    error => done([`${error}`]),
-  );
+  const frame = () => new Promise(requestAnimationFrame);
+  const transitions = () => document.getAnimations().filter(one => one instanceof CSSTransition);
+  document.fonts.ready.then(frame).then(frame)
+    .then(() => Promise.allSettled(transitions().map(({finished}) => finished)))
+    .then(frame)
+    .then(() => axe.run({preload: false, resultTypes: ["violations"]}))
+    .then(
+      ({violations}) => done(violations.flatMap(({id, nodes}) => nodes.map(({html}) => `${id}: ${html}`))),
+      error => done([`${error}`]),
+    );
 """
 # Rows of a table are alike; the rules take seconds for hundreds of cells.
 SHORTEN = "document.querySelectorAll('tr:nth-child(n + 5)').forEach(row => row.remove())"

@@ -1,18 +1,12 @@
 """Sphinx extension: formulas as MathML, which browsers draw and screen readers read without a script."""
 
-import re
 from typing import Any
 
 from docutils import nodes
-from docutils.utils.math.latex2mathml import tex2mathml
+from math_core import LatexError, LatexToMathML
 from sphinx.util import logging
 
-# TeX that docutils does not know -> what it knows.
-_TEX = (
-    (re.compile(r"\\([bB]ig)(?![a-zA-Z])"), r"\\\1l"),
-    (re.compile(r"\\dots(?![a-zA-Z])"), r"\\ldots"),
-    (re.compile(r"\\operatorname\*"), r"\\operatorname"),  # else the star is drawn
-)
+_CONVERTER = LatexToMathML(fancy_error=False)
 
 
 def setup(app: Any) -> dict[str, bool]:
@@ -22,21 +16,19 @@ def setup(app: Any) -> dict[str, bool]:
 
 
 def _inline(writer: Any, node: nodes.math) -> None:
-    writer.body.append(_mathml(node, as_block=False))
+    writer.body.append(_mathml(node, is_block=False))
     raise nodes.SkipNode
 
 
 def _displayed(writer: Any, node: nodes.math_block) -> None:
-    writer.body.append(f'<div class="hicp-formula">{_mathml(node, as_block=True)}</div>')
+    writer.body.append(f'<div class="hicp-formula">{_mathml(node, is_block=True)}</div>')
     raise nodes.SkipNode
 
 
-def _mathml(node: nodes.Element, as_block: bool) -> str:
+def _mathml(node: nodes.Element, is_block: bool) -> str:
     text = node.astext().strip()
-    for pattern, known in _TEX:
-        text = pattern.sub(known, text)
     try:
-        return tex2mathml(text, as_block=as_block)
-    except ValueError as error:
+        return _CONVERTER.convert_with_local_state(text, displaystyle=is_block)
+    except LatexError as error:
         logging.getLogger(__name__).warning("formula %r: %s", text, error, location=node)
         return ""
