@@ -17,10 +17,12 @@ def _index_prose_only(app: Any) -> None:
     index_page = getattr(app.builder, "index_page", None)  # other formats have none
 
     def index_prose(name: str, doctree: nodes.document, title: str) -> None:
-        prose = doctree.deepcopy()
-        for node in list(prose.findall(_is_no_prose)):
-            node.parent.remove(node)
-        index_page(name, prose, title)
+        taken = [(node.parent, node.parent.index(node), node) for node in doctree.findall(_is_no_prose)]
+        for parent, place, _ in reversed(taken):
+            del parent[place]
+        index_page(name, doctree, title)
+        for parent, place, node in taken:
+            parent.insert(place, node)
 
     if index_page:
         app.builder.index_page = index_prose

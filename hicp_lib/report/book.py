@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ def build_book(folders: Folders, left_out: Mapping[str, str] | None = None) -> t
         built = _run_sphinx(staging, book.parent / f"{folders.profile}.log")
         shutil.copytree(folders.results, built / "results" / folders.profile)
         drop_icon_font(built)
-        if problems := book_problems(built, lambda page, path: finish_page(page, path, built)):
+        if problems := book_problems(built, partial(finish_page, book=built)):
             raise RunError(f"book: {problems[0]} ({len(problems)} such problems in all)")
         if _key(folders, left_out) != key:
             raise RunError("book: what it is made of was changed while it was built; run the report again")

@@ -2,9 +2,13 @@
 
 import re
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 from bs4 import BeautifulSoup
+
+from hicp_lib.core.environment import usable_cores
+from hicp_lib.core.executor import run_jobs
 
 # Attributes through which an element loads something by itself; links that a reader clicks are fine.
 _LOADING = ("src", "srcset", "poster", "data")
@@ -43,6 +47,14 @@ def _says_nothing(alt: str) -> bool:
     return not alt.strip() or alt.lower().endswith((".png", ".svg", ".jpg", ".jpeg", ".gif", ".webp"))
 
 
+def _judged(path: Path, finish: Callable[[BeautifulSoup, Path], None] | None) -> list[str]:
+    page = BeautifulSoup(path.read_text(errors="replace"), "html.parser")
+    if finish is not None:
+        finish(page, path)
+        path.write_text(str(page))
+    return list(_page_problems(page))
+
+
 def book_problems(folder: Path, finish: Callable[[BeautifulSoup, Path], None] | None = None) -> list[str]:
     """What in a built book needs a network or lacks words, one line each; empty when it is sound.
 
@@ -51,7 +63,8 @@ def book_problems(folder: Path, finish: Callable[[BeautifulSoup, Path], None] | 
     folder : Path
         Of the built pages; all HTML and CSS files in it are read.
     finish : callable, optional
-        Changes a page before it is judged; takes what was read of it, and its path.
+        Changes a page before it is judged; takes what was read of it, and its path. A function of a module,
+        or a partial of one: pages are read side by side.
 
     Examples
     --------
@@ -61,13 +74,9 @@ def book_problems(folder: Path, finish: Callable[[BeautifulSoup, Path], None] | 
     ...     book_problems(Path(folder))
     ['index.html: loads from the network: <img src=https://a.org/b.png>']
     """
-    problems = []
-    for path in sorted(folder.rglob("*.html")):
-        page = BeautifulSoup(path.read_text(errors="replace"), "html.parser")
-        if finish is not None:
-            finish(page, path)
-            path.write_text(str(page))
-        problems += [f"{path.relative_to(folder)}: {problem}" for problem in _page_problems(page)]
+    pages = sorted(folder.rglob("*.html"))
+    found = dict(run_jobs([(path, partial(_judged, path, finish)) for path in pages], usable_cores()))
+    problems = [f"{path.relative_to(folder)}: {problem}" for path in pages for problem in found[path]]
     for path in sorted(folder.rglob("*.css")):
         if _REMOTE_IN_CSS.search(path.read_text(errors="replace")):
             problems.append(f"{path.relative_to(folder)}: loads from the network")

@@ -1,6 +1,7 @@
 """What a built page is given beyond Sphinx: less to load, and names for what has none."""
 
 import re
+from collections import Counter
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -44,8 +45,11 @@ def finish_page(page: BeautifulSoup, path: Path, book: Path) -> None:
         elif not searches and _CAN_WAIT.search(address):
             tag["defer"] = ""
     for icon in page.find_all("i", class_=re.compile("^fa-")):
-        _draw(icon, book / "_static" / "scripts" / "fontawesome.js")
+        _draw(page, icon, book / "_static" / "scripts" / "fontawesome.js")
+    n_named = Counter(str(tag["id"]) for tag in page.find_all(id=True))
     for figure in page.find_all("figure", class_="hicp"):
+        if n_named[str(figure.get("id"))] > 1:
+            del figure["id"]  # a heading has it, and is a line above
         _show_file(page, figure, path.parent)
     for table in page.find_all("table"):
         _name(page, table)
@@ -61,19 +65,17 @@ def _icons(script: Path) -> dict[str, list[str]]:
     return {name: of for name, *of in _ICON.findall(script.read_text())}
 
 
-def _draw(icon: Any, script: Path) -> None:
+def _draw(page: BeautifulSoup, icon: Any, script: Path) -> None:
     drawings = _icons(script)
     width, height, path = next(filter(None, (drawings.get(name[3:]) for name in icon["class"])))  # fa-NAME
     icon.name, icon["class"] = "svg", ["svg-inline--fa", *icon["class"]]
     icon.attrs |= {"viewBox": f"0 0 {width} {height}", "aria-hidden": "true"}
-    icon.append(BeautifulSoup(f'<path fill="currentColor" d="{path}"></path>', "html.parser"))
+    icon.append(page.new_tag("path", attrs={"fill": "currentColor", "d": path}))
 
 
 def _show_file(page: BeautifulSoup, figure: Any, folder: Path) -> None:
     """The file that lies beside the page in place of the copy within, and in full when asked for."""
     shown, link = figure.find("img"), figure.find("a", download=True)
-    if len(page.find_all(id=figure.get("id", ""))) > 1:
-        del figure["id"]  # a heading has it, and is a line above
     if shown is not None and link is not None:
         shown["src"] = link["href"]
     if shown is None or shown["src"].startswith("data:"):
