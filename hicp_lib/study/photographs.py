@@ -66,7 +66,7 @@ def beside(table: pd.DataFrame) -> pd.DataFrame:
     """
     columns = ["where", "subset", "detector", "value", "low", "high", "n_people"]
     parts = [table.assign(where=RENDERED), photographs("metrics").assign(where=PHOTOGRAPHED)]
-    rows = pd.concat(parts).query("metric == 'AP' and group == 'body'")
+    rows = pd.concat(parts, ignore_index=True).query("metric == 'AP' and group == 'body'")
     both = set.intersection(*(set(of["detector"]) for _, of in rows.groupby("where")))
     return rows.loc[rows["detector"].isin(both) & rows["subset"].isin(table["subset"]), columns]
 
@@ -85,7 +85,7 @@ def who_is_there(truth: Mapping[str, Annotations]) -> pd.DataFrame:
         One row per place and subset.
     """
     parts = [people_table(truth).assign(where=RENDERED), photographs("people").assign(where=PHOTOGRAPHED)]
-    rows = pd.concat(parts)
+    rows = pd.concat(parts, ignore_index=True)
     rows = rows.assign(occluded=rows["n_occluded"] / rows["n_labelled"], alone=rows["n_others"] == 0)
     columns = {
         "people": ("annotation_id", "size"), "height_px": ("height_px", "median"),

@@ -8,7 +8,7 @@ import onnxruntime
 import pytest
 from closerange import samples
 from closerange.frozen import FROZEN, GRID, LEAST, SIDE_PX, frozen_layers
-from closerange.make_samples import jobs
+from closerange.make_samples import drop_others, jobs
 from closerange.rows import HELD_BACK, batches, chosen_rows
 
 from hicp_lib.core.keypoints import HEAD, INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
@@ -123,6 +123,22 @@ def test_only_what_is_not_there_yet_is_drawn(tmp_path, monkeypatch):
     squares = np.load(tmp_path / "people" / first[0][0])
     assert squares["squares"].shape[1:] == (SIDE_PX, SIDE_PX, 3) and len(squares["squares"])
     assert squares["seen"][:, [*LEFT_HAND, *RIGHT_HAND, INDEX["neck"]]].shape[1] == 43
+
+
+def test_squares_of_other_pictures_are_dropped(tmp_path):
+    def files():
+        return sorted(path.name for path in tmp_path.glob("*.npz"))
+
+    for made_of, kept in ((["a", 4], False), (["a", 4], True), (["b", 4], False)):
+        for name in ("scenes_0_0.npz", "near_0_0.npz"):
+            (tmp_path / name).touch()
+        drop_others(tmp_path, "scenes", made_of)
+        assert files() == ["near_0_0.npz"] + ["scenes_0_0.npz"] * kept
+
+
+def test_fewer_squares_than_a_step_takes_are_refused():
+    with pytest.raises(SystemExit, match="5 squares to train on are fewer than one step's 8"):
+        next(batches(np.arange(5), 8, 0, 0, 3))
 
 
 def test_a_stopped_training_goes_on_with_the_same_batches():

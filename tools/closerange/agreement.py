@@ -1,11 +1,12 @@
 """How far networks for close range agree with MoveNet Thunder on photographs, to choose them by.
 
-    python tools/closerange/agreement.py PHOTOGRAPHS NAME=PEOPLE.onnx,HANDS.onnx [...]
+    python tools/closerange/agreement.py PHOTOGRAPHS NAME=PEOPLE.onnx,HANDS.onnx [...] --out FILE.csv
 
-Nobody need have annotated the photographs of the folder, so that those of `evaluate.py --photographs` are
+The study's are the 20 of `examples/media` in github.com/CMU-Perceptual-Computing-Lab/openpose and the 3 of
+`examples/demo` in github.com/MVIG-SJTU/AlphaPose. Nobody need have annotated the photographs of the folder, so that those of `evaluate.py --photographs` are
 kept for judging. Each large person that Thunder finds there is cut out, with the head (Basic) and without
-(Headless); what Thunder is sure of in the first crop counts as true. Prints the mean OKS of body points, also
-of MoveNet Lightning, below which no training should bring a network.
+(Headless); what Thunder is sure of in the first crop counts as true. Writes the mean OKS of body points, also of
+MoveNet Lightning, below which no training should bring a network.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from hicp_lib.core.images import read_image
 from hicp_lib.core.keypoints import COCO_17, INDEX, SIGMAS
@@ -87,18 +89,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("photographs", type=Path)
     parser.add_argument("models", nargs="*", help="NAME=PEOPLE.onnx,HANDS.onnx")
+    parser.add_argument("--out", type=Path, required=True)
     arguments = parser.parse_args()
     detectors = {"movenet-lightning": make_detector("movenet-lightning")}
     for name, files in (text.split("=", 1) for text in arguments.models):
         model, hand_model = files.split(",")
         detectors[name] = make_detector("closerange", model=model, hand_model=hand_model, look_again=False)
-    people = list(cases(arguments.photographs))
+    people, rows = list(cases(arguments.photographs)), []
     for subset in LEAST:
         of_subset = [case for case in people if case.subset == subset]
         for name, detector in detectors.items():
             values = [agreement(detector, case) for case in of_subset]
-            spread = np.std(values) / np.sqrt(len(values))
-            print(f"{subset:9} {len(values)} people  {name:30} {np.mean(values):.3f} +- {spread:.3f}")
+            error = np.std(values, ddof=1) / np.sqrt(len(values))
+            rows.append((subset, name, np.mean(values), error, len(values)))
+    table = pd.DataFrame(rows, columns=["subset", "network", "value", "standard_error", "n_people"])
+    table.to_csv(arguments.out, index=False, float_format="%.4f", lineterminator="\n")
+    print(table.to_string())
 
 
 if __name__ == "__main__":

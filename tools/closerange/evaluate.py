@@ -38,13 +38,12 @@ from hicp_lib.study.sources import open_near, open_source
 
 DEVELOPMENT_SEED, MIN_PIXELS = 900_003, 20_000
 BODIES = ("movenet-lightning", "movenet-thunder")
-OTHERS = (
-    *BODIES, "mediapipe",
-    "combined:movenet-thunder+mediapipe-hands", "combined:mediapipe-pose+mediapipe-hands",
-)  # fmt: skip
-"""What networks are held against; of the combinations with all looks (notebook 02b)."""
-OURS = "closerange"
 _ALL_LOOKS = {"looks": "wrists+mirrored+image+along"}
+_COMBINED = ("combined:movenet-thunder+mediapipe-hands", "combined:mediapipe-pose+mediapipe-hands")
+OTHERS: dict[str, tuple[str, dict[str, Any]]] = {name: (name, {}) for name in (*BODIES, "mediapipe")}
+OTHERS |= {f"{name}, all looks": (name, _ALL_LOOKS) for name in _COMBINED}
+"""Detectors and their options that networks are held against; looks as of notebook 02b."""
+OURS = "closerange"
 
 
 def held_out() -> tuple[dict[str, Path], Path]:
@@ -74,12 +73,28 @@ def networks(models: dict[str, list[str]], ways: bool) -> dict[str, dict[str, An
     return made | {f"{OURS}, {name}": of[name] for name in others}
 
 
-def ablations(metrics: pd.DataFrame, first: str) -> pd.DataFrame:
-    """Average precision of networks, by the names they were given."""
-    ours = metrics["detector"].str.startswith(OURS) & (metrics["metric"] == "AP")
-    of = metrics[ours & metrics["group"].isin(["body", "hand"])]
-    variants = of["detector"].str.removeprefix(OURS).str.removeprefix(", ").replace("", first)
-    return of.assign(variant=variants)[["variant", "subset", "group", "value", "low", "high"]]
+def ablations(metrics: pd.DataFrame, pairs: pd.DataFrame, first: str) -> pd.DataFrame:
+    """Average precision of networks by the names they were given, and less that of the one named in `less`.
+
+    "A; B" compares with the one whose name begins with "A", others with the first.
+    """
+    names = metrics["detector"][metrics["detector"].str.startswith(OURS)].drop_duplicates()
+    shown = {name: name.removeprefix(OURS).removeprefix(", ") or first for name in names}
+    bases = {}
+    for name, variant in shown.items():
+        kind, _, way = variant.partition("; ")
+        like = [one for one, other in shown.items() if way and ";" not in other and other.startswith(kind)]
+        bases[name] = like[0] if like else OURS
+    keys = ["detector", "subset", "group"]
+    rows = metrics[metrics["detector"].isin(names) & metrics["group"].isin(["body", "hand"])]
+    rows = rows[rows["metric"] == "AP"][[*keys, "value", "low", "high"]]
+    changes = pairs[(pairs["metric"] == "AP") & (pairs["other"] == pairs["detector"].map(bases))]
+    changes = changes.rename(columns={"value": "change", "low": "change_low", "high": "change_high"})
+    rows = rows.merge(changes[[*keys, "change", "change_low", "change_high"]], "left", keys)
+    variants = rows["detector"].map(shown)
+    rows.insert(0, "variant", variants)
+    rows.insert(6, "less", rows["detector"].map(bases).map(shown).mask(rows["change"].isna()))
+    return rows.drop(columns="detector")
 
 
 def main() -> None:
@@ -96,12 +111,11 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as place:
         if arguments.photographs:
             folders, whole = make_subsets(arguments.photographs, Path(place))[0], None
-            groups, others = ("body",), BODIES
+            groups, others = ("body",), {name: OTHERS[name] for name in BODIES}
         else:
             folders, whole = development(arguments.development) if arguments.development else held_out()
         truth = {subset: read_annotations(folder / "annotations.json") for subset, folder in folders.items()}
-        runs = {name: (name, _ALL_LOOKS if name.startswith("combined:") else {}) for name in others}
-        runs |= {name: (OURS, options) for name, options in networks(models, arguments.ways).items()}
+        runs = others | {name: (OURS, options) for name, options in networks(models, arguments.ways).items()}
         found = {
             (subset, name): detections_of(time_dataset(detector, folder, **options))
             for subset, folder in folders.items()
@@ -117,7 +131,7 @@ def main() -> None:
         first = next(iter(models))
         compared = [OURS, *others]
         told = metrics[metrics["detector"].isin(compared)]
-        tables = {"metrics": told, "differences": ours, "ablations": ablations(metrics, first)}
+        tables = {"metrics": told, "differences": ours, "ablations": ablations(metrics, pairs, first)}
         kept = [subset for subset in folders if subset != "near"]  # Near is cut from other images
         of_whole = {(s, d): run for (s, d), run in found.items() if s in kept and d in compared}
         bodies = {case: drawn[case] for case in drawn if case[:2] in of_whole and case[2] == "body"}

@@ -4,7 +4,7 @@
                                             [--dask ADDRESS]
 
 writes FOLDER/scenes and FOLDER/near (pictures with annotations), and FOLDER/people and FOLDER/hands (a file
-of squares for every picture and round). What was finished before is kept. `--dask` renders on an existing
+of squares for every picture and round). What was finished before is kept, unless pictures or code changed. `--dask` renders on an existing
 cluster. Identities are development ones; the seeds differ from every seed that another part of the project
 uses for tuning or for evaluation.
 """
@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from closerange.frozen import SETS, SIDE_PX  # noqa: E402
 from closerange.samples import draw_sample  # noqa: E402
 from hicp_lib.core.executor import run_jobs  # noqa: E402
-from hicp_lib.core.files import atomic_path, sha256_file  # noqa: E402
+from hicp_lib.core.files import atomic_path, read_json, sha256_file, write_json  # noqa: E402
 from hicp_lib.core.images import read_image  # noqa: E402
 from hicp_lib.experiments.near import near_stage  # noqa: E402
 from hicp_lib.formats.annotations import Annotations, read_annotations  # noqa: E402
@@ -78,8 +78,19 @@ def jobs(folder: Path, of: str, kind: str, rounds: int) -> Iterator[tuple[str, p
             out = folder / of / f"{kind}_{image_id:06d}_{round_}.npz"
             if not out.exists():
                 chosen = np.random.default_rng([SEEDS[kind], image_id, round_, 1]).choice(names, _N_FILLERS)
-                of_image = (folder / kind / "images", people, image_id, chosen.tolist(), SEEDS[kind], round_)
+                its = people.of_images({image_id})
+                of_image = (folder / kind / "images", its, image_id, chosen.tolist(), SEEDS[kind], round_)
                 yield out.name, partial(draw_image, *of_image, out)
+
+
+def drop_others(squares: Path, kind: str, made_of: list) -> None:
+    """Delete squares that were drawn from other pictures, or by other code."""
+    stamp = [*made_of, sha256_file(Path(__file__)), sha256_file(Path(__file__).with_name("samples.py"))]
+    file = squares / f"{kind}.json"
+    if not file.is_file() or read_json(file) != stamp:
+        for path in squares.glob(f"{kind}_*.npz"):
+            path.unlink()
+        write_json(file, stamp)
 
 
 def main() -> None:
@@ -98,6 +109,7 @@ def main() -> None:
         print(kind, sha256_file(place / "annotations.json"))
         for of in SETS:
             (folder / of).mkdir(exist_ok=True)
+            drop_others(folder / of, kind, [sha256_file(place / "annotations.json"), arguments.rounds])
             for _ in run_jobs(jobs(folder, of, kind, arguments.rounds)):
                 pass
     print({of: len(list((folder / of).glob("*.npz"))) for of in SETS}, "files of squares")

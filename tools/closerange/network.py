@@ -1,6 +1,6 @@
-"""The network: MoveNet Lightning, frozen, and a decoder for 136 keypoints on its features.
+"""The network: MoveNet Lightning, and a decoder for 136 keypoints on its features.
 
-MoveNet's layers stay as they are, for photographs' sake: onnxruntime runs them, and what the decoder needs
+MoveNet's finer layers stay as they are, for photographs' sake: onnxruntime runs them, and what the decoder needs
 of them is kept, so that training runs the rest only. These are features at a quarter, an eighth and a
 sixteenth of the input's resolution, and its own maps of 17 body points, as logarithms. MoveNet's
 coarsest layers are there twice: frozen, for these maps, and as the beginning of what is trained. The decoder

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 
 import numpy as np
@@ -15,6 +16,8 @@ N_CHECKED = 1500
 def batches(rows: np.ndarray, size: int, seed: int, first: int, last: int) -> Iterator[np.ndarray]:
     """The rows of each step from `first`: all rows, in another order each time."""
     per_epoch = len(rows) // size
+    if not per_epoch:
+        sys.exit(f"{len(rows)} squares to train on are fewer than one step's {size}; make more")
     for k in range(first, last):
         epoch, place = divmod(k, per_epoch)
         if k == first or place == 0:

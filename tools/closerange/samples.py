@@ -161,8 +161,7 @@ def _warped(
         shown = np.zeros_like(image)
         shown[max(top, 0) : bottom, max(left, 0) : right] = image[max(top, 0) : bottom, max(left, 0) : right]
         image = shown
-    flags = cv2.INTER_AREA if scale < 0.5 else cv2.INTER_LINEAR
-    return cv2.warpAffine(image, matrix, (SIDE_PX, SIDE_PX), flags=flags), matrix
+    return cv2.warpAffine(image, matrix, (SIDE_PX, SIDE_PX)), matrix
 
 
 def _occlude(

@@ -43,6 +43,11 @@ class CloseRange:
         is.
     **person_boxes : object
         See `hicp_lib.detectors.onnx.box_source.BoxOptions`.
+
+    Raises
+    ------
+    InputError
+        If a file holds another network, or that of hands is given for whole people or the other way round.
     """
 
     name = "closerange"
@@ -56,6 +61,9 @@ class CloseRange:
         self._model, self._hand_model = (
             open_model(of, **run) if of else open_committed(file, **run) for file, of in ours.items()
         )
+        for model, n_points in ((self._model, N_KEYPOINTS), (self._hand_model, len(HAND_POINTS[0]))):
+            if [(port.name, port.shape) for port in model.outputs] != [("keypoints", (1, n_points, 5))]:
+                raise model.refusal(f"expected what tools/closerange/export.py writes: keypoints (1, {n_points}, 5)")
         self._padding, self._looks_again, self._presence = padding, look_again, presence
         self.takes_boxes = self._boxes.kind == "gt"
         self.settings: dict[str, Any] = {"padding": padding, "look_again": look_again, "presence": presence}

@@ -48,7 +48,7 @@ def change_per_keypoint(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.Data
     both = both[both["source_image"] == both["source_image_headless"]].sort_values(by)
     both["change"] = both["hit_headless"].astype(float) - both["hit"]
     rates = both.groupby(by)[["hit", "hit_headless"]].mean().reset_index()
-    table = proportions(both, by, "change", draws).merge(rates, on=by)
+    table = proportions(both, by, "change", draws, are_shares=False).merge(rates, on=by)
     table["keypoint"] = [NAMES[k] for k in table["keypoint"]]
     table = table.rename(columns={"value": "change", "hit": "basic", "hit_headless": "headless"})
     return table[[*by, "basic", "headless", "change", "low", "high", "n", "n_images"]]

@@ -13,7 +13,9 @@ from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, with_i
 ALPHA, POWER = 0.05, 0.8
 
 
-def proportions(rows: pd.DataFrame, by: Sequence[str], of: str, draws: Draws = Draws()) -> pd.DataFrame:
+def proportions(
+    rows: pd.DataFrame, by: Sequence[str], of: str, draws: Draws = Draws(), are_shares: bool = True
+) -> pd.DataFrame:
     """Mean of a column per group of rows, with its 95 % bootstrap interval.
 
     Parameters
@@ -27,6 +29,8 @@ def proportions(rows: pd.DataFrame, by: Sequence[str], of: str, draws: Draws = D
         Column of booleans or numbers; rows where it is missing are left out.
     draws : Draws, optional
         Of the bootstrap.
+    are_shares : bool, optional
+        Whether the values are shares from 0 to 1 (`mean_with_interval`), not differences of them.
 
     Returns
     -------
@@ -45,7 +49,7 @@ def proportions(rows: pd.DataFrame, by: Sequence[str], of: str, draws: Draws = D
     units = ["source_image", "subject"] if "subject" in rows else ["source_image"]
     table = []
     for group, part in rows.groupby(list(by), sort=False, observed=True):
-        interval = mean_with_interval(part[of], part["source_image"], draws, part.get("subject"))
+        interval = mean_with_interval(part[of], part["source_image"], draws, part.get("subject"), are_shares)
         table.append((*group, *interval, len(part), *part[units].nunique()))
     counts = ["n_images", "n_people"][: len(units)]
     return pd.DataFrame(table, columns=[*by, "value", "low", "high", "n", *counts])
@@ -101,11 +105,13 @@ def paired_differences(
 
 
 def mean_with_interval(
-    values: ArrayLike, clusters: ArrayLike, draws: Draws = Draws(), subjects: ArrayLike | None = None
-) -> tuple[float, float, float]:
+    values: ArrayLike, clusters: ArrayLike, draws: Draws = Draws(), subjects: ArrayLike | None = None,
+    are_shares: bool | None = None,
+) -> tuple[float, float, float]:  # fmt: skip
     """Mean, and its 95 % percentile interval from resampling subjects, then clusters of each.
 
-    Booleans give a share, with an exact interval where it is 0 or 1 (`with_interval`).
+    A mean share of 0 or 1 has an exact interval (`with_interval`). It holds for flags, and for shares of several
+    keypoints as well: their chance to be 1 is at most their mean.
 
     Parameters
     ----------
@@ -117,6 +123,8 @@ def mean_with_interval(
         Of the bootstrap.
     subjects : array, shape (n,), optional
         The subject of each value; by default one for all.
+    are_shares : bool, optional
+        Whether the values are shares, from 0 to 1; by default if they are booleans.
 
     Returns
     -------
@@ -137,7 +145,7 @@ def mean_with_interval(
     whose = units["subject"][np.unique(cluster, return_index=True)[1]]
     times, n_people = draw_counts(whose, draws), whose.nunique()
     sums = np.bincount(cluster, weights=values.astype(float))
-    n_clusters = len(whose) if values.dtype == bool else 0
+    n_clusters = len(whose) if (values.dtype == bool if are_shares is None else are_shares) else 0
     return with_interval(times @ sums / (times @ np.bincount(cluster)), n_people, n_clusters)
 
 

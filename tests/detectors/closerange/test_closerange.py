@@ -11,7 +11,8 @@ from hicp_lib.core.files import read_json
 from hicp_lib.core.images import read_image
 from hicp_lib.core.keypoints import INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 from hicp_lib.detectors.closerange import detector
-from hicp_lib.detectors.onnx.session import open_committed
+from hicp_lib.core.errors import InputError
+from hicp_lib.detectors.onnx.session import Port, open_committed
 from hicp_lib.detectors.registry import make_detector
 
 SIDE_PX, ROUGH_PX = 192, 7
@@ -22,8 +23,9 @@ HANDS = {"left": LEFT_HAND, "right": RIGHT_HAND}
 class Network:
     size_px, settings = (SIDE_PX, SIDE_PX), {}
 
-    def __init__(self, answer):
+    def __init__(self, answer, n_points):
         self.answer, self.seen = answer, []
+        self.outputs = [Port("keypoints", (1, n_points, 5), "tensor(float)")]
 
     def run(self, blob):
         assert blob.shape == (1, 3, SIDE_PX, SIDE_PX) and blob.dtype == np.float32
@@ -59,7 +61,7 @@ def image():
 
 
 def made(monkeypatch, whole, hand=brightest, **options):
-    networks = {"people.onnx": Network(whole), "hands.onnx": Network(hand)}
+    networks = {"people.onnx": Network(whole, N_KEYPOINTS), "hands.onnx": Network(hand, 21)}
     monkeypatch.setattr(detector, "open_model", lambda file, **_: networks[file])
     found = detector.CloseRange(model="people.onnx", hand_model="hands.onnx", **options)
     return found, networks["hands.onnx"]
@@ -141,3 +143,15 @@ def test_a_portrait_has_a_head_and_no_legs():
     assert (found.scores[0, :5] > 0.5).all() and (found.scores[0, legs] < 0.5).all()
     off_px = np.linalg.norm(found.keypoints_px[0, :5] - lightning.keypoints_px[0, :5], axis=1)
     assert off_px.max() < 0.05 * image.shape[0]
+
+
+@pytest.mark.parametrize("file", ["closerange-hands", "movenet-lightning", "openpose-mobilenet", "nanodet"])
+def test_other_networks_are_refused_in_place_of_that_of_people(file):
+    with pytest.raises(InputError, match=r"expected what tools/closerange/export.py writes: keypoints \(1, 136, 5"):
+        make_detector("closerange", model=DATA_DIR / "weights" / f"{file}.onnx")
+
+
+@pytest.mark.parametrize("file", ["closerange", "movenet-thunder", "posenet"])
+def test_other_networks_are_refused_in_place_of_that_of_hands(file):
+    with pytest.raises(InputError, match=r"keypoints \(1, 21, 5"):
+        make_detector("closerange", hand_model=DATA_DIR / "weights" / f"{file}.onnx")
