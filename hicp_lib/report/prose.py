@@ -10,7 +10,6 @@ In a page of `book/`, between double braces:
     notebooks                                         names of the notebooks that were run
     data("paper.json")                                a JSON file of `data/`, for loops over its rows
     label("combined:posenet+mediapipe-hands")         a detector's name in plain words
-    not_told_apart(best, others)                      whose share may be as low as the best's
     repetition()                                      this run beside the profile's reference run
 
 A name that no result file has stops the build. Texts are shown as they are, whatever is in them; what is
@@ -18,7 +17,6 @@ Markdown, as texts of `data` may be, says so: `data("paper.json").why | safe`.
 """
 
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -141,36 +139,6 @@ def label(detector: str) -> str:
     return " + ".join(DETECTORS[part].label if part in DETECTORS else part for part in parts)
 
 
-def not_told_apart(best: dict[str, Any], others: list[dict[str, Any]]) -> list[str]:
-    """Detectors whose share may be as low as the lowest: the 95 % interval of the difference holds 0.
-
-    The interval is made of those of the two shares (Newcombe, Statistics in Medicine 1998, method 10).
-
-    Parameters
-    ----------
-    best : dict of str to object
-        `value, low, high` of the lowest share; None where there is no interval, which tells nobody apart.
-    others : list of dict
-        The same of the others, and `detector`.
-
-    Returns
-    -------
-    list of str
-
-    Examples
-    --------
-    >>> best = {"value": 0.1, "low": 0.05, "high": 0.2}
-    >>> not_told_apart(best, [{"detector": "a", "value": 0.2, "low": 0.1, "high": 0.3}])
-    ['a']
-    """
-    return [
-        row["detector"]
-        for row in others
-        if None in (row["low"], best["high"])
-        or row["value"] - best["value"] <= math.hypot(row["value"] - row["low"], best["high"] - best["value"])
-    ]
-
-
 def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
     """The rows of a table by column; what is missing is None."""
     return table.astype(object).where(table.notna(), None).to_dict("records")
@@ -201,8 +169,7 @@ def render_page(source: Path, results: Results, profile: str) -> str:
     offered = ("value", "raw", "rows", "figure", "stamp", "repetition")
     names = {name: getattr(results, name) for name in offered}
     names |= {"data": lambda name: json.loads((DATA_DIR / name).read_text())}
-    names |= {"profile": profile, "notebooks": results.notebooks()}
-    names |= {"label": label, "not_told_apart": not_told_apart}
+    names |= {"profile": profile, "notebooks": results.notebooks(), "label": label}
     try:
         return environment.from_string(source.read_text()).render(names)
     except jinja2.TemplateError as error:

@@ -3,10 +3,11 @@
     python tools/closerange/agreement.py PHOTOGRAPHS NAME=PEOPLE.onnx,HANDS.onnx [...] --out FILE.csv
 
 The study's are the 20 of `examples/media` in github.com/CMU-Perceptual-Computing-Lab/openpose and the 3 of
-`examples/demo` in github.com/MVIG-SJTU/AlphaPose. Nobody need have annotated the photographs of the folder, so that those of `evaluate.py --photographs` are
-kept for judging. Each large person that Thunder finds there is cut out, with the head (Basic) and without
-(Headless); what Thunder is sure of in the first crop counts as true. Writes the mean OKS of body points, also of
-MoveNet Lightning, below which no training should bring a network.
+`examples/demo` in github.com/MVIG-SJTU/AlphaPose. Nobody need have annotated the photographs of the folder,
+so that those of `evaluate.py --photographs` are kept for judging. Each large person that Thunder finds
+there is cut out, with the head (Basic) and without (Headless); what Thunder is sure of in the first crop
+counts as true. Writes the mean OKS of body points, also of MoveNet Lightning, below which no training
+should bring a network.
 """
 
 from __future__ import annotations

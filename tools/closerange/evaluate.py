@@ -93,7 +93,7 @@ def ablations(metrics: pd.DataFrame, pairs: pd.DataFrame, first: str) -> pd.Data
     rows = rows.merge(changes[[*keys, "change", "change_low", "change_high"]], "left", keys)
     variants = rows["detector"].map(shown)
     rows.insert(0, "variant", variants)
-    rows.insert(6, "less", rows["detector"].map(bases).map(shown).mask(rows["change"].isna()))
+    rows.insert(7, "less", rows["detector"].map(bases).map(shown).mask(rows["change"].isna()))
     return rows.drop(columns="detector")
 
 

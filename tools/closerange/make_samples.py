@@ -4,9 +4,9 @@
                                             [--dask ADDRESS]
 
 writes FOLDER/scenes and FOLDER/near (pictures with annotations), and FOLDER/people and FOLDER/hands (a file
-of squares for every picture and round). What was finished before is kept, unless pictures or code changed. `--dask` renders on an existing
-cluster. Identities are development ones; the seeds differ from every seed that another part of the project
-uses for tuning or for evaluation.
+of squares for every picture and round). What was finished before is kept, unless pictures or code changed.
+`--dask` renders on an existing cluster. Identities are development ones; the seeds differ from every seed
+that another part of the project uses for tuning or for evaluation.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """The network: MoveNet Lightning, and a decoder for 136 keypoints on its features.
 
-MoveNet's finer layers stay as they are, for photographs' sake: onnxruntime runs them, and what the decoder needs
-of them is kept, so that training runs the rest only. These are features at a quarter, an eighth and a
-sixteenth of the input's resolution, and its own maps of 17 body points, as logarithms. MoveNet's
-coarsest layers are there twice: frozen, for these maps, and as the beginning of what is trained. The decoder
-adds up four resolutions and gives per keypoint a map of logits at a quarter of the input's, for body points
-added to MoveNet's, and the logits of two questions: is the keypoint in the picture, and is it visible?
+MoveNet's finer layers stay as they are, for photographs' sake: onnxruntime runs them, and what the decoder
+needs of them is kept, so that training runs the rest only. These are features at a quarter, an eighth and a
+sixteenth of the input's resolution, and its own maps of 17 body points, as logarithms. MoveNet's coarsest
+layers are there twice: frozen, for these maps, and as the beginning of what is trained. The decoder adds up
+four resolutions and gives per keypoint a map of logits at a quarter of the input's, for body points added
+to MoveNet's, and the logits of two questions: is the keypoint in the picture, and is it visible?
 """
 
 from __future__ import annotations

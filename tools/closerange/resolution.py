@@ -1,4 +1,4 @@
-"""Whether small people are found better in enlarged pictures, as the paper proposes (section V).
+"""Whether small people are found better in enlarged pictures.
 
     python tools/closerange/resolution.py FOLDER PEOPLE.onnx HANDS.onnx --out TABLES [--steps 1500]
 

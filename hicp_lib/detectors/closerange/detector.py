@@ -61,9 +61,10 @@ class CloseRange:
         self._model, self._hand_model = (
             open_model(of, **run) if of else open_committed(file, **run) for file, of in ours.items()
         )
-        for model, n_points in ((self._model, N_KEYPOINTS), (self._hand_model, len(HAND_POINTS[0]))):
-            if [(port.name, port.shape) for port in model.outputs] != [("keypoints", (1, n_points, 5))]:
-                raise model.refusal(f"expected what tools/closerange/export.py writes: keypoints (1, {n_points}, 5)")
+        for opened, n_points in ((self._model, N_KEYPOINTS), (self._hand_model, len(HAND_POINTS[0]))):
+            shape = (1, n_points, 5)
+            if [(port.name, port.shape) for port in opened.outputs] != [("keypoints", shape)]:
+                raise opened.refusal(f"expected what tools/closerange/export.py writes: keypoints {shape}")
         self._padding, self._looks_again, self._presence = padding, look_again, presence
         self.takes_boxes = self._boxes.kind == "gt"
         self.settings: dict[str, Any] = {"padding": padding, "look_again": look_again, "presence": presence}

@@ -110,8 +110,8 @@ def mean_with_interval(
 ) -> tuple[float, float, float]:  # fmt: skip
     """Mean, and its 95 % percentile interval from resampling subjects, then clusters of each.
 
-    A mean share of 0 or 1 has an exact interval (`with_interval`). It holds for flags, and for shares of several
-    keypoints as well: their chance to be 1 is at most their mean.
+    A mean share of 0 or 1 has an exact interval (`with_interval`). It holds for flags, and for shares of
+    several keypoints as well: their chance to be 1 is at most their mean.
 
     Parameters
     ----------

@@ -141,7 +141,10 @@ def filmstrip(run: Run, times_s: Sequence[float], note: str) -> Figure:
     for (above, below), time_s in zip(axes.T, times_s, strict=True):
         _draw_moment(above, below, run, time_s)
     told = {"script": run.job.trial.script, "condition": run.job.condition, "n": len(times_s), "note": note}
-    told |= {"nearest_cm": 100 * run.cycles["distance_m"].min(), "away_cm": 100 * run.cycles["hand_error_m"].max()}
+    told |= {
+        "nearest_cm": 100 * run.cycles["distance_m"].min(),
+        "away_cm": 100 * run.cycles["hand_error_m"].max(),
+    }
     return Figure(figure, *texts("filmstrip", **told))
 
 

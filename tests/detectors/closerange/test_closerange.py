@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
 from hicp_lib.core.images import read_image
 from hicp_lib.core.keypoints import INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 from hicp_lib.detectors.closerange import detector
-from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.session import Port, open_committed
 from hicp_lib.detectors.registry import make_detector
 
@@ -147,7 +147,9 @@ def test_a_portrait_has_a_head_and_no_legs():
 
 @pytest.mark.parametrize("file", ["closerange-hands", "movenet-lightning", "openpose-mobilenet", "nanodet"])
 def test_other_networks_are_refused_in_place_of_that_of_people(file):
-    with pytest.raises(InputError, match=r"expected what tools/closerange/export.py writes: keypoints \(1, 136, 5"):
+    with pytest.raises(
+        InputError, match=r"expected what tools/closerange/export.py writes: keypoints \(1, 136, 5"
+    ):
         make_detector("closerange", model=DATA_DIR / "weights" / f"{file}.onnx")
 
 

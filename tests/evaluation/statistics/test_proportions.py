@@ -107,7 +107,9 @@ def test_flags_that_are_alike_in_all_people_count_each_person_once():
 
 
 def test_shares_that_are_all_1_have_an_exact_interval_and_differences_of_0_none():
-    rows = pd.DataFrame({"part": "arm", "subject": np.repeat(np.arange(12), 8), "source_image": np.arange(96)})
+    rows = pd.DataFrame(
+        {"part": "arm", "subject": np.repeat(np.arange(12), 8), "source_image": np.arange(96)}
+    )
     whole = proportions(rows.assign(share=1.0), ["part"], "share").iloc[0]
     assert whole["low"] == pytest.approx(0.025 ** (1 / 12)) and whole["high"] == 1
     same = proportions(rows.assign(change=0.0), ["part"], "change", are_shares=False).iloc[0]
