@@ -140,7 +140,7 @@ def _images(bag: Bag, stream: Stream, rows: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _known(bag: Bag, times_s: np.ndarray, T_base_cam: np.ndarray, notes: list[str]) -> Poses:
-    """The poses that are known."""
+    """The poses of all images; NaN, of which a note tells, where unknown."""
     is_known = np.isfinite(T_base_cam).all(axis=(1, 2))
     if not is_known.any():
         raise InputError(
@@ -148,4 +148,4 @@ def _known(bag: Bag, times_s: np.ndarray, T_base_cam: np.ndarray, notes: list[st
         )
     if not is_known.all():
         notes.append(f"{(~is_known).sum()} of {len(is_known)} images have no pose and will be left out")
-    return times_s[is_known], T_base_cam[is_known]
+    return times_s, T_base_cam

@@ -270,6 +270,15 @@ def test_poses_are_those_of_the_transforms(tmp_path):
     np.testing.assert_allclose(recording.T_base_cam[2, :3, 0], [0, 1, 0], atol=1e-9)
 
 
+def test_one_known_pose_is_that_of_its_image_only(tmp_path):
+    def more(write, m):
+        write("/tf", m.tf(100.1, "base", OPTICAL, (1, 2, 3)), 102)
+
+    recording, notes = imported(tmp_path, write_bag(tmp_path, more=more), base_frame="base")
+    assert recording.times_s.tolist() == [100.1] and any("3 of 4 images have no pose" in of for of in notes)
+    np.testing.assert_allclose(recording.T_base_cam[:, :3, 3], [[1, 2, 3]], atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("more", "expected"),
     [
