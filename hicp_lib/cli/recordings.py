@@ -101,6 +101,12 @@ def import_(
     if sum(map(bool, (poses, base_frame, joint_states))) > 1:
         message = "Give one of --poses, --base-frame and --joint-states."
         raise click.UsageError(message, click.get_current_context())
+    of_bag = {"color-topic": color_topic, "depth-topic": depth_topic, "base-frame": base_frame,
+              "joint-states": joint_states or None}  # fmt: skip
+    others, only = (of_bag, "bag") if bag is None else ({"rate": rate, "depth-scale": depth_scale}, "open3d")
+    if unused := [f"--{name}" for name, value in others.items() if value is not None]:
+        message = f"{unused[0]} goes with --{only} only; leave it out."
+        raise click.UsageError(message, click.get_current_context())
     source = read_pose_source(poses, mount)
     with filled_folder(out) as inner:
         if bag is not None:

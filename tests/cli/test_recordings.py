@@ -28,6 +28,12 @@ def small(tmp_path):
         (["import", "out", "--open3d", "/no", "--rate", "nan"], "nan is no finite number"),
         (["import", "out", "--open3d", "/no", "--mount", "x"], "'x' is not one of"),
         (["import", "out", "--bag", "x", "--base-frame", "a", "--joint-states"], "Give one of --poses"),
+        (["import", "out", "--open3d", "/no", "--joint-states"], "--joint-states goes with --bag only"),
+        (["import", "out", "--open3d", "/no", "--base-frame", "b"], "--base-frame goes with --bag only"),
+        (["import", "out", "--open3d", "/no", "--color-topic", "/x"], "--color-topic goes with --bag only"),
+        (["import", "out", "--open3d", "/no", "--depth-topic", "/x"], "--depth-topic goes with --bag only"),
+        (["import", "out", "--bag", "x", "--rate", "5"], "--rate goes with --open3d only; leave it out"),
+        (["import", "out", "--bag", "x", "--depth-scale", "7"], "--depth-scale goes with --open3d only"),
         (["camera", "out", "--poses", "x", "--joints", "-"], "Give either --poses FILE or --joints FILE"),
     ],
 )
