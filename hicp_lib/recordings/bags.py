@@ -146,7 +146,7 @@ def _images(bag: Bag, stream: Stream, rows: np.ndarray) -> Iterator[np.ndarray]:
     for row, (_, _, message) in enumerate(bag.messages(stream.topic)):
         if row in wanted:
             image = decode(where, message)
-            check_size(where, image, stream.camera)
+            check_size(where, image.shape, stream.camera)
             yield rectify(image, stream.pixels_px)
 
 
