@@ -151,6 +151,9 @@ def given(model: Path | None, person_model: Path | None, boxes: str | None, pair
     {'boxes': 'gt', 'min_score': 0.5, 'sides': 'left'}
     """
     named = {"model": model, "person_model": person_model, "boxes": boxes}
-    return {name: value for name, value in named.items() if value is not None} | {
-        name: json_or_text(text) for name, text in pairs
-    }
+    options = {name: value for name, value in named.items() if value is not None}
+    for name, text in pairs:
+        if name in options:
+            raise InputError(f"option {name!r} of the detector is given twice; give it once")
+        options[name] = json_or_text(text)
+    return options

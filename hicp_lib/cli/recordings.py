@@ -5,8 +5,15 @@ from pathlib import Path
 
 import click
 
-from hicp_lib.cli import options
-from hicp_lib.cli.options import PATH, FiniteRange, detector_options, given, people_option, worker_options
+from hicp_lib.cli.options import (
+    PATH,
+    FiniteRange,
+    detector_options,
+    given,
+    people_option,
+    say,
+    worker_options,
+)
 from hicp_lib.core.files import write_table
 from hicp_lib.core.folders import filled_folder, locked_folder
 
@@ -101,6 +108,12 @@ def import_(
     if sum(map(bool, (poses, base_frame, joint_states))) > 1:
         message = "Give one of --poses, --base-frame and --joint-states."
         raise click.UsageError(message, click.get_current_context())
+    of_bag = {"color-topic": color_topic, "depth-topic": depth_topic, "base-frame": base_frame,
+              "joint-states": joint_states or None}  # fmt: skip
+    others, only = (of_bag, "bag") if bag is None else ({"rate": rate, "depth-scale": depth_scale}, "open3d")
+    if unused := [f"--{name}" for name, value in others.items() if value is not None]:
+        message = f"{unused[0]} goes with --{only} only; leave it out."
+        raise click.UsageError(message, click.get_current_context())
     source = read_pose_source(poses, mount)
     with filled_folder(out) as inner:
         if bag is not None:
@@ -115,7 +128,7 @@ def import_(
 
 def _tell(out: Path, n_frames: int, notes: list[str]) -> None:
     for note in notes:
-        options.say(note)
+        say(note)
     click.echo(f"{out}: {n_frames} frames; check them with: hicp record check {out}")
 
 
@@ -152,13 +165,18 @@ def lift(folder: Path, detector: str, method: str, out: Path, workers: int | str
     from hicp_lib.detectors.runtime.run import detect_images
     from hicp_lib.formats.detection_files import refuse_other_suffix
     from hicp_lib.lifting.table import lift_recording
-    from hicp_lib.recordings.recording import open_recording
+    from hicp_lib.recordings.recording import RGB_LIST, colour_files, open_recording
+    from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, read_file_list
 
     refuse_other_suffix(out, (".parquet", ".csv"))
     recording = open_recording(folder)
+    paths, n_all = colour_files(recording), len(read_file_list(folder / RGB_LIST)[0])
+    if n := n_all - len(recording):
+        lacking = f"have no depth or no pose within {MAX_DIFFERENCE_S:g} s"
+        say(f"{folder / RGB_LIST}: {n} of {n_all} colour images {lacking} and are left out")
     options = given(**chosen)
     made = make_detector(detector, **options)  # refuses what is none of its options
-    found = detect_images(detector, dict(enumerate(recording.rgb_paths)), workers, **options)
+    found = detect_images(detector, paths, workers, **options)
     del made  # until here, since the runs share its open network
     table = lift_recording(recording, list(detections_of(found).values()), method)
     write_table(out, table)

@@ -8,7 +8,7 @@ import numpy as np
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.rotations import matrices_from_quaternions
 from hicp_lib.recordings.bag_file import Bag, stamp_s
-from hicp_lib.recordings.tum import MAX_DIFFERENCE_S
+from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, UNIT_TOLERANCE
 
 Link = tuple[str, list[float], list[np.ndarray]]
 """A frame's parent, and times and poses relative to it; no times for a static frame."""
@@ -29,7 +29,7 @@ def read_links(bag: Bag) -> dict[str, Link]:
     Raises
     ------
     InputError
-        If a frame changes its parent.
+        If a frame changes its parent, or is static and moves.
     """
     links: dict[str, Link] = {}
     for topic, _, message in bag.messages(*bag.topics("TFMessage", "tfMessage")):
@@ -40,6 +40,8 @@ def read_links(bag: Bag) -> dict[str, Link]:
                 raise InputError(f"{bag.path}: {topic}: {frame} is in {known} and in {parent}; keep one")
             times_s += [] if topic.endswith("tf_static") else [stamp_s(moved)]
             T_parent_frame.append(rigid(moved.transform))
+            if times_s and len(times_s) < len(T_parent_frame):
+                raise InputError(f"{bag.path}: {topic}: {frame} is static and moves in {parent}; keep one")
     return links
 
 
@@ -53,9 +55,12 @@ def rigid(transform: object) -> np.ndarray:
     Returns
     -------
     array, shape (4, 4)
+        Its rotation is NaN if the quaternion is not of length 1.
     """
     T, rotation, moved = np.eye(4), transform.rotation, transform.translation  # type: ignore[attr-defined]
-    T[:3, :3] = matrices_from_quaternions(np.array([[rotation.x, rotation.y, rotation.z, rotation.w]]))[0]
+    quaternions = np.array([[rotation.x, rotation.y, rotation.z, rotation.w]])
+    is_rotation = abs(np.linalg.norm(quaternions) - 1) <= UNIT_TOLERANCE
+    T[:3, :3] = matrices_from_quaternions(quaternions)[0] if is_rotation else np.nan
     T[:3, 3] = moved.x, moved.y, moved.z
     return T
 
@@ -79,7 +84,7 @@ def frame_poses(bag: Bag, links: dict[str, Link], base: str, frame: str, times_s
     Raises
     ------
     InputError
-        If no transforms lead from one to the other.
+        If no transforms lead from one to the other, or one of these is no rotation and translation.
     """
     above = {name: _ancestors(links, name) for name in (base, frame)}
     common = next((name for name in above[frame] if name in above[base]), None)
@@ -91,7 +96,12 @@ def frame_poses(bag: Bag, links: dict[str, Link], base: str, frame: str, times_s
     T = {name: np.broadcast_to(np.eye(4), (len(times_s), 4, 4)) for name in above}
     for name, path in above.items():
         for step in path[: path.index(common)]:
-            _, known_s, T_parent = links[step]
+            parent, known_s, T_parent = links[step]
+            if not np.isfinite(T_parent).all():
+                wrong = f"a transform of {step!r} to {parent!r} is no rotation and translation"
+                raise InputError(
+                    f"{bag.path}: {wrong} (its quaternion is not of length 1, or NaN); record it again"
+                )
             T[name] = (_nearest(times_s, known_s, T_parent) if known_s else T_parent[-1]) @ T[name]
     return np.linalg.inv(T[base]) @ T[frame]
 
@@ -114,7 +124,7 @@ def joint_poses(bag: Bag, mount: str, times_s: np.ndarray) -> np.ndarray:
     Raises
     ------
     InputError
-        If a joint of torso or neck is missing.
+        If a joint of torso or neck is missing, or its angles are no radians.
     """
     from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub  # not in every installation
 
@@ -126,6 +136,9 @@ def joint_poses(bag: Bag, mount: str, times_s: np.ndarray) -> np.ndarray:
     if missing:
         known = ", ".join(series) or "none"
         raise InputError(f"{bag.path}: has no joint {missing[0]!r}; joints there are: {known}")
+    for name in HEAD_JOINTS:
+        if degrees := [angle for _, angle in series[name] if abs(angle) > 2 * np.pi]:
+            raise InputError(f"{bag.path}: joint {name!r} is at {degrees[0]:g}; expected radians up to 2 pi")
     angles_rad = [_nearest(times_s, *zip(*series[name], strict=True)) for name in HEAD_JOINTS]
     return load_icub().T_root_camera(np.stack(angles_rad, axis=-1), mount)
 

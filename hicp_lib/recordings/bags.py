@@ -16,6 +16,9 @@ from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, associate
 from hicp_lib.recordings.writer import Poses, write_recording
 
 _SAME_PX = 0.5  # intrinsics this similar belong to one camera
+_SAME_POSE = (
+    1e-3  # metres, and entries of rotations: cameras that move less than this are fixed to each other
+)
 
 
 def import_bag(
@@ -64,13 +67,13 @@ def import_bag(
 def _import(
     path: str, out: str, given: list | None, topics: Topics, base_frame: str | None, joints_mount: str | None
 ) -> tuple[int, list[str]]:
-    notes: list[str] = []
     with open_bag(path) as bag:
         streams = color, depth = find_streams(bag, topics)
-        T_color_depth = _alignment(bag, color, depth)
-        notes += [f"{depth.topic}: aligned to {color.topic}"] if T_color_depth is not None else []
-        notes += [f"{stream.topic}: {note}" for stream in streams for note in stream.notes]
+        notes = [f"{stream.topic}: {note}" for stream in streams for note in stream.notes]
         times_s, rows = _pairs(bag, color, depth, notes)
+        T_color_depth = _alignment(bag, color, depth, times_s)
+        if T_color_depth is not None:
+            notes.insert(0, f"{depth.topic}: aligned to {color.topic}")
         poses: Poses = (np.array(given[0]), np.array(given[1])) if given else (np.zeros(1), np.eye(4)[None])
         if base_frame is not None:
             T_base_cam = frame_poses(bag, read_links(bag), base_frame.strip("/"), color.frame, times_s)
@@ -86,8 +89,11 @@ def _import(
     return len(times_s), [f"{path}: {note}" for note in notes]
 
 
-def _alignment(bag: Bag, color: Stream, depth: Stream) -> np.ndarray | None:
-    """From the depth camera's coordinates to the colour camera's; None if depth is already aligned."""
+def _alignment(bag: Bag, color: Stream, depth: Stream, times_s: np.ndarray) -> np.ndarray | None:
+    """From the depth camera's coordinates to the colour camera's; None if depth is already aligned.
+
+    It may be among the moving transforms, but has to be the same at all images.
+    """
     if color.frame == depth.frame:
         of_color, of_depth = (list(vars(stream.camera).values()) for stream in (color, depth))
         if np.allclose(of_color, of_depth, rtol=0, atol=_SAME_PX):
@@ -97,7 +103,12 @@ def _alignment(bag: Bag, color: Stream, depth: Stream) -> np.ndarray | None:
         raise InputError(f"{bag.path}: {depth.topic} has another camera than colour, and neither has a frame")
     links = realsense_links(bag) or read_links(bag)
     try:
-        return frame_poses(bag, links, color.frame, depth.frame, np.zeros(1))[0]
+        T_color_depth = frame_poses(bag, links, color.frame, depth.frame, times_s)
+        known = T_color_depth[np.isfinite(T_color_depth).all(axis=(1, 2))]
+        if len(known) == 0 or np.ptp(known, axis=0).max() > _SAME_POSE:
+            wrong = "moves" if len(known) else f"is not known within {MAX_DIFFERENCE_S:g} s of any image"
+            raise InputError(f"{bag.path}: {depth.frame!r} {wrong} relative to {color.frame!r}")
+        return known[0]
     except InputError as error:
         wrong = f"{depth.topic} is not aligned to {color.topic}"
         raise InputError(f"{error}; {wrong}, so record aligned depth, or these transforms") from None
@@ -135,12 +146,12 @@ def _images(bag: Bag, stream: Stream, rows: np.ndarray) -> Iterator[np.ndarray]:
     for row, (_, _, message) in enumerate(bag.messages(stream.topic)):
         if row in wanted:
             image = decode(where, message)
-            check_size(where, image, stream.camera)
+            check_size(where, image.shape, stream.camera)
             yield rectify(image, stream.pixels_px)
 
 
 def _known(bag: Bag, times_s: np.ndarray, T_base_cam: np.ndarray, notes: list[str]) -> Poses:
-    """The poses that are known."""
+    """The poses of all images; NaN, of which a note tells, where unknown."""
     is_known = np.isfinite(T_base_cam).all(axis=(1, 2))
     if not is_known.any():
         raise InputError(
@@ -148,4 +159,4 @@ def _known(bag: Bag, times_s: np.ndarray, T_base_cam: np.ndarray, notes: list[st
         )
     if not is_known.all():
         notes.append(f"{(~is_known).sum()} of {len(is_known)} images have no pose and will be left out")
-    return times_s[is_known], T_base_cam[is_known]
+    return times_s, T_base_cam

@@ -108,6 +108,8 @@ def decoded(raw: bytes) -> str:
 def _checked(path: str, points: np.ndarray, residuals: np.ndarray, said: Said) -> Points:
     """Points, names and rate."""
     points, rate = points[:3], said.get("RATE", np.zeros(0))
+    if points.shape[2] == 0:
+        raise InputError(f"{path}: holds no frames; export it again, or as TSV")
     lists = sorted((key for key in said if key.startswith("LABELS")), key=natural_order)
     labels = [str(name) for key in lists for name in said[key]]
     names = [decoded(name.encode(errors="surrogateescape")).strip() for name in labels]

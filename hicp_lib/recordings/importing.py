@@ -125,7 +125,7 @@ def _rectified(path: Path, intrinsics: Camera, pixels_px: np.ndarray | None) -> 
     """An image file's content, without distortion."""
     content = read_bytes(path, "expected an image")
     image = decode(content, path, cv2.IMREAD_UNCHANGED)
-    check_size(path, image, intrinsics)
+    check_size(path, image.shape, intrinsics)
     if pixels_px is None:
         return content
     quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]

@@ -136,6 +136,9 @@ def _joint_poses(lines: list[tuple[float, str]], mount: str) -> Poses:
         raise InputError("joints: no lines arrived; expected six angles in degrees in each")
     stamps_s, angles_deg = zip(*(read_joints_line(line, arrival_s) for arrival_s, line in lines), strict=True)
     times_s, first = np.unique(stamps_s, return_index=True)
+    if len(times_s) < 2:
+        still = "for a robot that stands still give --poses FILE instead"
+        raise InputError(f"joints: lines of only one time arrived; expected one line for each image; {still}")
     return times_s, load_icub().T_root_camera(np.radians(angles_deg)[first], mount)
 
 

@@ -22,7 +22,7 @@ import pandas as pd
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, read_json
-from hicp_lib.core.images import decode, read_image
+from hicp_lib.core.images import decode, image_header, read_image
 from hicp_lib.core.keypoints import NAMES
 from hicp_lib.core.tables import read_table
 from hicp_lib.recordings.camera_file import read_camera
@@ -182,7 +182,7 @@ def read_rgb(recording: Recording, k: int) -> np.ndarray:
         If it cannot be read, or its size is not that of `camera.json`.
     """
     image = read_image(recording.rgb_paths[k])
-    check_size(recording.rgb_paths[k], image, recording.intrinsics)
+    check_size(recording.rgb_paths[k], image.shape, recording.intrinsics)
     return image
 
 
@@ -313,14 +313,38 @@ def read_csv(path: str | Path, numbers: Sequence[str], texts: Sequence[str] = ()
     return pd.concat([of_numbers, table[list(texts)]], axis=1)
 
 
-def check_size(where: str | Path, image: np.ndarray, intrinsics: Camera) -> None:
+def colour_files(recording: Recording) -> dict[int, Path]:
+    """The colour images' files by row of the frame, for detectors; only their headers are read.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    dict of int to Path
+
+    Raises
+    ------
+    InputError
+        If an image's size is not that of `camera.json`.
+    """
+    for path in recording.rgb_paths:
+        width_px, height_px, _ = image_header(path)
+        if width_px:  # else reading its pixels will report what is wrong
+            check_size(path, (height_px, width_px), recording.intrinsics)
+    return dict(enumerate(recording.rgb_paths))
+
+
+def check_size(where: str | Path, shape: tuple[int, ...], intrinsics: Camera) -> None:
     """Refuse an image of another size than its camera's.
 
     Parameters
     ----------
     where : str or Path
         What was read, for messages.
-    image : array, shape (height, width, ...)
+    shape : tuple of int
+        Of the image: height, width, ...
     intrinsics : Camera
 
     Raises
@@ -328,7 +352,7 @@ def check_size(where: str | Path, image: np.ndarray, intrinsics: Camera) -> None
     InputError
         If it is of another size.
     """
-    height, width = image.shape[:2]
+    height, width = shape[:2]
     if (width, height) != (intrinsics.width_px, intrinsics.height_px):
         expected = f"{intrinsics.width_px} x {intrinsics.height_px}; do not crop or bin"
         raise InputError(f"{where}: is {width} x {height} pixels; its camera says {expected}")
@@ -338,7 +362,7 @@ def _read_depth_m(recording: Recording, path: Path) -> np.ndarray:
     units = decode(read_bytes(path, "expected a depth image"), path, cv2.IMREAD_UNCHANGED)
     if units.dtype != np.uint16 or units.ndim != 2:
         raise InputError(f"{path}: is not a 16-bit image of one channel; write depth as 16-bit PNG")
-    check_size(path, units, recording.intrinsics)
+    check_size(path, units.shape, recording.intrinsics)
     depth_m = units * np.float32(1 / recording.depth_units_per_m)
     depth_m[units == 0] = np.nan
     return depth_m

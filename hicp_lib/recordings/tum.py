@@ -18,7 +18,7 @@ from hicp_lib.core.names import is_inside
 from hicp_lib.core.rotations import matrices_from_quaternions, quaternions_from_matrices
 
 MAX_DIFFERENCE_S = 0.02  # images and poses further apart in time do not belong together
-_UNIT_TOLERANCE = 0.01  # a quaternion's length may differ from 1 by this much: files are rounded
+UNIT_TOLERANCE = 0.01  # a quaternion's length may differ from 1 by this much: files are rounded
 _MAX_ABS = 1e20  # more is not a time
 MAX_PLACE_M = 1e7  # more is not a place on Earth
 _MAX_TIME_S = 1e11  # later than the year 5000: another unit
@@ -97,7 +97,7 @@ def read_poses(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
         if np.abs(pose[:3]).max() > MAX_PLACE_M:
             raise _error(path, number, f"{fields[:3]} is no place; expected metres, up to {MAX_PLACE_M:g}")
         length = np.linalg.norm(pose[3:])
-        if not abs(length - 1) <= _UNIT_TOLERANCE:
+        if not abs(length - 1) <= UNIT_TOLERANCE:
             wrong = f"has a quaternion of length {length:.4g}; expected qx qy qz qw of length 1"
             raise _error(path, number, wrong)
         rows.append([time_s, *pose])

@@ -19,7 +19,8 @@ JPEG_QUALITY = 95
 _MOST_UNITS = np.iinfo(np.uint16).max
 
 Poses = tuple[np.ndarray, np.ndarray]
-"""Times (m,) in seconds and T_base_cam (m, 4, 4); one pose is for all, m without times for m frames."""
+"""Times (m,) in seconds and T_base_cam (m, 4, 4); one pose is for all, m without times for m frames, NaN
+is an unknown one."""
 
 
 def write_recording(
@@ -86,7 +87,7 @@ def write_index(
         Of the images.
     poses : tuple of array
         Times (m,) and transforms from camera coordinates to the robot's base frame (m, 4, 4); a single one
-        applies to all images.
+        applies to all images, those with NaN are left out.
     names : (sequence of str, sequence of str), optional
         Files of colour and depth in the folder; by default named by `rgb_name` and `depth_name`.
     """
@@ -99,7 +100,8 @@ def write_index(
         raise InputError(f"{folder}: {wrong}; expected one for each, or a file with times")
     if len(pose_s) < 2:
         pose_s, T_base_cam = times_s, np.broadcast_to(T_base_cam, (len(times_s), 4, 4))
-    write_poses(folder / POSES_FILE, pose_s, T_base_cam)
+    is_known = np.isfinite(T_base_cam).all(axis=(1, 2))
+    write_poses(folder / POSES_FILE, pose_s[is_known], T_base_cam[is_known])
     write_file_list(folder / DEPTH_LIST, times_s, depth)
     write_file_list(folder / RGB_LIST, times_s, rgb)
 

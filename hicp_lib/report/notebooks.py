@@ -277,7 +277,7 @@ def parse_overrides(pairs: list[tuple[str, str]], notebooks: list[Notebook]) -> 
     Raises
     ------
     InputError
-        If no notebook declares the name, or the value does not fit.
+        If no notebook declares the name, it is given twice, or the value does not fit.
 
     Examples
     --------
@@ -289,6 +289,8 @@ def parse_overrides(pairs: list[tuple[str, str]], notebooks: list[Notebook]) -> 
     known = sorted({name for notebook in notebooks for name in notebook.defaults})
     for name, text in pairs:
         refuse_unknown("-p: parameter", name, known)
+        if [given for given, _ in pairs].count(name) > 1:
+            raise InputError(f"-p {name}: is given twice; give it once")
         for notebook in (notebook for notebook in notebooks if name in notebook.defaults):
             value = _parse(name, text, notebook.defaults[name])
             overrides[notebook.name] |= check_parameters(notebook, {name: value}, f"-p {name}")

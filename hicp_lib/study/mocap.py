@@ -27,7 +27,7 @@ from hicp_lib.lifting.table import lift_found
 from hicp_lib.mocap.registration import Registration
 from hicp_lib.mocap.synchronisation import ClockOffset, clock_offset
 from hicp_lib.recordings.qualisys import MotionCapture, read_mocap
-from hicp_lib.recordings.recording import MOCAP_FILE, Recording, read_simulation, read_truth
+from hicp_lib.recordings.recording import MOCAP_FILE, Recording, colour_files, read_simulation, read_truth
 from hicp_lib.study.plots.palette import PERFECT
 from hicp_lib.study.registration import Registered
 
@@ -129,7 +129,7 @@ def detect_frames(recording: Recording, detectors: Sequence[str]) -> dict[str, l
     dict of str to list of Detections
         By detector, in the order of the frames.
     """
-    paths = dict(enumerate(recording.rgb_paths))
+    paths = colour_files(recording)
     return {detector: list(detections_of(detect_images(detector, paths)).values()) for detector in detectors}
 
 

@@ -61,6 +61,14 @@ def mistake(capsys, *arguments: str) -> str:
         (["record", "import", "a", "b", "--rate", "inf"], "inf is no finite number"),
         (["record", "camera", "out", "--seconds", "nan"], "nan is no finite number"),
         (
+            ["models", "show", "--detector", "posenet", *["-o", "padding", "1"] * 2],
+            "option 'padding' of the detector is given twice; give it once",
+        ),
+        (
+            ["models", "show", "--detector", "x", "--boxes", "detected", "-o", "boxes", "image"],
+            "option 'boxes' of the detector is given twice; give it once",
+        ),
+        (
             ["models", "show", "--detector", "posenet", "-o", "min_root_score", "NaN"],
             "is nan; expected 0 to 1",
         ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from PIL import Image
 
 from hicp_lib.cli import main as cli
 from tests.recordings.conftest import write_small
@@ -28,6 +29,12 @@ def small(tmp_path):
         (["import", "out", "--open3d", "/no", "--rate", "nan"], "nan is no finite number"),
         (["import", "out", "--open3d", "/no", "--mount", "x"], "'x' is not one of"),
         (["import", "out", "--bag", "x", "--base-frame", "a", "--joint-states"], "Give one of --poses"),
+        (["import", "out", "--open3d", "/no", "--joint-states"], "--joint-states goes with --bag only"),
+        (["import", "out", "--open3d", "/no", "--base-frame", "b"], "--base-frame goes with --bag only"),
+        (["import", "out", "--open3d", "/no", "--color-topic", "/x"], "--color-topic goes with --bag only"),
+        (["import", "out", "--open3d", "/no", "--depth-topic", "/x"], "--depth-topic goes with --bag only"),
+        (["import", "out", "--bag", "x", "--rate", "5"], "--rate goes with --open3d only; leave it out"),
+        (["import", "out", "--bag", "x", "--depth-scale", "7"], "--depth-scale goes with --open3d only"),
         (["camera", "out", "--poses", "x", "--joints", "-"], "Give either --poses FILE or --joints FILE"),
     ],
 )
@@ -79,6 +86,26 @@ def test_lift_needs_a_recording(capsys, tmp_path):
     arguments = ["lift", "--recording", str(tmp_path), "--detector", "mediapipe", "--out", "k.parquet"]
     assert cli.run(arguments) == 2
     assert "camera.json: cannot be read" in capsys.readouterr().err
+
+
+def test_lift_refuses_colour_of_another_size_before_anybody_is_looked_for(capsys, small, monkeypatch):
+    monkeypatch.setattr("hicp_lib.detectors.runtime.run.detect_images", None)
+    Image.new("RGB", (64, 48)).save(small / "rgb/000002.jpg")
+    arguments = ["lift", "--recording", str(small), "--detector", "posenet", "--out", "k.parquet"]
+    assert cli.run(arguments) == 2
+    told = capsys.readouterr().err
+    assert "000002.jpg: is 64 x 48 pixels; its camera says 32 x 24" in told and told.count("\n") == 1
+
+
+def test_lift_tells_of_frames_left_out(capsys, small, tmp_path, monkeypatch):
+    monkeypatch.setenv("HICP_CACHE", str(tmp_path / "cache"))
+    poses = (small / "groundtruth.txt").read_text().splitlines(keepends=True)
+    (small / "groundtruth.txt").write_text("".join(poses[:-1]))
+    arguments = ["lift", "--recording", str(small), "--detector", "posenet", "--workers", "1"]
+    assert cli.run([*arguments, "--out", str(tmp_path / "k.parquet")]) == 0
+    told = capsys.readouterr()
+    assert f"{small}/rgb.txt: 1 of 4 colour images have no depth or no pose within 0.02 s" in told.err
+    assert "in 3 frames lifted" in told.out
 
 
 def test_lift_opens_a_network_once(small, tmp_path, monkeypatch):

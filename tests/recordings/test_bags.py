@@ -240,20 +240,41 @@ def in_depth_frame(m, t, k):
     return m.image(t, "depth_optical", "16UC1", depth_mm(k))
 
 
-def test_depth_of_another_camera_is_aligned_by_the_transforms(tmp_path):
+def raw_depth(tmp_path, topic, times_s, step_m=0.0):
+    """A bag with depth of another camera, and the transforms between both on a topic."""
+
     def more(write, m):
-        write("/tf_static", m.tf(0, "link", OPTICAL, (0.1, 0, 0)), 102)
-        write("/tf_static", m.tf(0, "link", "depth_optical", (0.5, 0, -0.3)), 102)
+        for k, t in enumerate(times_s):
+            write(topic, m.tf(t, "link", OPTICAL, (0.1, 0, 0)), 102)
+            write(topic, m.tf(t, "link", "depth_optical", (0.5 + step_m * k, 0, -0.3)), 102)
 
     changes = {"depth": in_depth_frame, "depth_topic": "/camera/depth/image_raw", "more": more}
-    recording, notes = imported(
-        tmp_path, write_bag(tmp_path, depth_info={"frame": "depth_optical"}, **changes)
-    )
+    return write_bag(tmp_path, depth_info={"frame": "depth_optical"}, **changes)
+
+
+@pytest.mark.parametrize(("topic", "times_s"), [("/tf_static", [0]), ("/tf", [100.1, 100.3])])
+def test_depth_of_another_camera_is_aligned_by_the_transforms(tmp_path, topic, times_s):
+    recording, notes = imported(tmp_path, raw_depth(tmp_path, topic, times_s))
     assert any("aligned to" in note for note in notes)
     depth_m = read_depth_m(recording, 0)
     np.testing.assert_allclose(depth_m[np.isfinite(depth_m)], 1.2, atol=1e-6)
     left = 15.5 + 30 * ((0 - 0.5 - 15.5) / 30 * 1.5 + 0.4) / 1.2  # of the depth image, in colour
     assert np.isnan(depth_m[12, : int(left)]).all() and np.isfinite(depth_m[12, int(left) + 1 :]).all()
+
+
+@pytest.mark.parametrize(
+    ("times_s", "step_m", "expected"),
+    [
+        ([0], 0, "'depth_optical' is not known within 0.02 s of any image relative to 'color_optical'"),
+        ([100.1, 100.2], 0.01, "'depth_optical' moves relative to 'color_optical'; .* is not aligned to"),
+    ],
+)
+def test_depth_that_transforms_cannot_align_is_refused(tmp_path, times_s, step_m, expected):
+    with pytest.raises(InputError, match=expected):
+        import_bag(raw_depth(tmp_path, "/tf", times_s, step_m), tmp_path / "r")
+
+
+TOPICS = ("/tf_static", "/tf")
 
 
 def moving(write, m):
@@ -270,6 +291,15 @@ def test_poses_are_those_of_the_transforms(tmp_path):
     np.testing.assert_allclose(recording.T_base_cam[2, :3, 0], [0, 1, 0], atol=1e-9)
 
 
+def test_one_known_pose_is_that_of_its_image_only(tmp_path):
+    def more(write, m):
+        write("/tf", m.tf(100.1, "base", OPTICAL, (1, 2, 3)), 102)
+
+    recording, notes = imported(tmp_path, write_bag(tmp_path, more=more), base_frame="base")
+    assert recording.times_s.tolist() == [100.1] and any("3 of 4 images have no pose" in of for of in notes)
+    np.testing.assert_allclose(recording.T_base_cam[:, :3, 3], [[1, 2, 3]], atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("more", "expected"),
     [
@@ -279,6 +309,21 @@ def test_poses_are_those_of_the_transforms(tmp_path):
         ),
         (lambda write, m: [write("/tf", m.tf(1, p, "b", (0, 0, 0)), 1) for p in "ac"], "b is in a and in c"),
         (lambda write, m: write("/tf", m.tf(1, "odom", OPTICAL, (0, 0, 0)), 1), "no pose is within 0.02 s"),
+        (
+            lambda write, m: [write(t, m.tf(100, "odom", OPTICAL, (0, 0, 0)), 1) for t in TOPICS],
+            "color_optical is static and moves in odom; keep one",
+        ),
+        (
+            lambda write, m: [write(t, m.tf(100, "odom", OPTICAL, (0, 0, 0)), 1) for t in TOPICS[::-1]],
+            "color_optical is static and moves in odom; keep one",
+        ),
+        *(
+            (
+                lambda write, m, xyz=xyz, xyzw=xyzw: write("/tf", m.tf(100, "odom", OPTICAL, xyz, xyzw), 1),
+                "a transform of 'color_optical' to 'odom' is no rotation and translation",
+            )
+            for xyz, xyzw in (((0, 0, 0), (0, 0, 0, 0)), ((0, 0, np.nan), (0, 0, 0, 1)))
+        ),
     ],
 )
 def test_transforms_that_lead_nowhere_are_refused(tmp_path, more, expected):
@@ -302,6 +347,14 @@ def test_poses_by_joint_angles(tmp_path):
     np.testing.assert_allclose(recording.T_base_cam[1], expected, atol=1e-6)
     with pytest.raises(InputError, match="has no joint 'torso_pitch'; joints there are: none"):
         import_bag(write_bag(tmp_path, "mcap"), tmp_path / "s", joints_mount="level")
+
+
+def test_joint_angles_in_degrees_are_refused(tmp_path):
+    def more(write, m):
+        write("/joints", m.joints(100, {name: 10.0 * k for k, name in enumerate(HEAD_JOINTS)}), 102)
+
+    with pytest.raises(InputError, match=f"joint '{HEAD_JOINTS[1]}' is at 10; expected radians"):
+        import_bag(write_bag(tmp_path, more=more), tmp_path / "r", joints_mount="level")
 
 
 @pytest.mark.parametrize("kind", KINDS)

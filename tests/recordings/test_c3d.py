@@ -80,6 +80,12 @@ def test_the_size_of_the_file_decides_where_it_can(tmp_path):
     np.testing.assert_allclose(read_mocap(_file(tmp_path, content)).points_m, points / 1e3, rtol=1e-6)
 
 
+def test_a_file_without_frames_is_refused(tmp_path):
+    content = make_c3d(POINTS[:1], header={"last": 0}, point={"FRAMES": 0})[:1536]
+    with pytest.raises(InputError, match="mocap.c3d: holds no frames; export it again"):
+        read_mocap(_file(tmp_path, content))
+
+
 @pytest.mark.parametrize("trial", [70_000, None])
 @pytest.mark.parametrize("count", [4464, 65_535])
 def test_more_frames_than_16_bits_count(tmp_path, count, trial):

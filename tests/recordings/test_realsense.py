@@ -128,6 +128,11 @@ def test_a_line_of_joints_that_is_none_is_told_and_the_bag_is_kept(tmp_path, cam
     assert import_bag(tmp_path / "r.db3", tmp_path / "r")[0] == 2
 
 
+def test_joints_of_one_time_only_are_no_stream(tmp_path, camera):
+    with pytest.raises(InputError, match="joints: lines of only one time arrived.*give --poses FILE"):
+        record(tmp_path, camera, Thread(target=camera.feed, args=(2,)), ["7 5.0 1 2 3 4 5 6\n"] * 2)
+
+
 @pytest.mark.parametrize("line", ["", "1 2 3 4 5", "1 2 3 4 5 nan", "1 2 3 4 5 6 7", "a b c d e f"])
 def test_lines_that_are_none_are_refused(line):
     with pytest.raises(InputError, match="expected lines of six angles"):

@@ -107,6 +107,11 @@ def test_overrides_take_the_type_of_the_default(study, name, text, expected):
     assert overrides == {"00_first": {name: expected}, "01_second": {name: expected}}
 
 
+def test_a_parameter_given_twice_is_refused(study):
+    with pytest.raises(InputError, match="-p seed: is given twice; give it once"):
+        parse_overrides([("seed", "1"), ("seed", "2")], read_notebooks(study / "notebooks"))
+
+
 def test_relative_paths_are_those_of_the_caller(study, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     overrides = parse_overrides([("images", "here")], read_notebooks(study / "notebooks"))
