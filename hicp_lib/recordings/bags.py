@@ -16,9 +16,7 @@ from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, associate
 from hicp_lib.recordings.writer import Poses, write_recording
 
 _SAME_PX = 0.5  # intrinsics this similar belong to one camera
-_SAME_POSE = (
-    1e-3  # metres, and entries of rotations: cameras that move less than this are fixed to each other
-)
+_SAME_POSE = 1e-3  # m, and of rotations' entries: cameras that move less are fixed to each other
 
 
 def import_bag(

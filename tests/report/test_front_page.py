@@ -84,6 +84,8 @@ class Run:
         """The page's text on one line, references resolved."""
         text = render_page(CHECKOUT / "book" / "index.md", Results(self.folder, "quick"), "quick")
         text = re.sub(r"&#(\d+);", lambda found: chr(int(found[1])), text)
+        for table in re.findall(r"(?:^|\n)\s*\n(\|.*\n.*)", text):
+            assert table.partition("\n")[2].startswith("|---"), f"a row out of its table: {table}"
         return " ".join(text.split())
 
 
