@@ -18,7 +18,7 @@ from hicp_lib.core.video import SUFFIXES as VIDEO_SUFFIXES
 from hicp_lib.core.video import open_video
 from hicp_lib.detectors.runtime.run import Image, boxes_by_image, detect_each
 from hicp_lib.formats.annotations import read_annotations
-from hicp_lib.formats.detection_files import json_list, open_detections
+from hicp_lib.formats.detection_files import json_list, names_beside, open_detections
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff")
 
@@ -97,8 +97,7 @@ def detect_to_file(
 ) -> tuple[int, int, int]:  # fmt: skip
     """Detect people and write them, image by image; images that cannot be read are skipped.
 
-    `OUT.images.json` next to `out` names all images, including those without people, and those that could not
-    be read.
+    `names_beside(out)` lists all images, including those without people, and those that could not be read.
 
     Parameters
     ----------
@@ -131,9 +130,8 @@ def detect_to_file(
     images = (known.update({i: facts}) or (i, image) for i, facts, image in pictures.images)
     each = detect_each(name, images, boxes_px=pictures.boxes_px, n_images=n, flagged=flagged, **options)
     with ExitStack() as stack:
-        write = stack.enter_context(open_detections(out))
-        listed = stack.enter_context(atomic_path(out.with_suffix(".images.json")))
-        append = stack.enter_context(json_list(listed))
+        append = stack.enter_context(json_list(stack.enter_context(atomic_path(names_beside(out)))))
+        write = stack.enter_context(open_detections(out))  # left first: it removes an earlier list
         for image_id, found in stack.enter_context(closing(each)):
             facts = known.pop(image_id)
             if isinstance(found, InputError):

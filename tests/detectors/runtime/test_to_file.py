@@ -81,7 +81,7 @@ def test_a_broken_picture_does_not_lose_the_folder(folder, tmp_path, capsys):
     output, errors = capsys.readouterr()
     assert output.startswith(f"{tmp_path / 'd.json'}: 10 people in 10 images; 2 could not be read\n")
     assert errors.count("is not an image") == 2 and "shot_5.png" in errors and "shot_7.png" in errors
-    images = json.loads((tmp_path / "d.images.json").read_text())
+    images = json.loads((tmp_path / "d.json.images.json").read_text())
     assert [image["id"] for image in images if "error" in image] == [6, 8]
     assert 6 not in {row["image_id"] for row in json.loads((tmp_path / "d.json").read_text())}
 
