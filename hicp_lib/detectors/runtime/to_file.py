@@ -19,6 +19,7 @@ from hicp_lib.core.video import open_video
 from hicp_lib.detectors.runtime.run import Image, boxes_by_image, detect_each
 from hicp_lib.formats.annotations import read_annotations
 from hicp_lib.formats.detection_files import json_list, names_beside, open_detections
+from hicp_lib.formats.json_validation import MAX_INTEGER
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff")
 
@@ -51,8 +52,8 @@ class Pictures:
 def open_pictures(source: Path) -> Pictures:
     """The images of a folder, or the frames of a video.
 
-    Image ids are COCO's if files are named that way (000000012345.jpg is 12345), else they count files in
-    natural order; for a video, frames from 0.
+    Image ids are COCO's if files are named that way (000000012345.jpg is 12345, up to `MAX_INTEGER`), else
+    they count files in natural order; for a video, frames from 0.
 
     Raises
     ------
@@ -70,7 +71,8 @@ def open_pictures(source: Path) -> Pictures:
         raise InputError(f"{source}: holds no images; expected files such as 000001.jpg or photo.png")
     stems = [os.path.splitext(name)[0] for name in names]
     numbers = {int(stem) for stem in stems if stem.isascii() and stem.isdigit()}
-    ids = map(int, stems) if len(numbers) == len(names) else range(1, len(names) + 1)
+    are_ids = len(numbers) == len(names) and max(numbers) <= MAX_INTEGER
+    ids = map(int, stems) if are_ids else range(1, len(names) + 1)
     return Pictures(source, _files(source, zip(ids, names, strict=True)), len(names))
 
 

@@ -64,6 +64,13 @@ def test_image_numbers_are_those_of_coco_or_the_order_of_names(tmp_path):
     assert [i for i, *_ in open_pictures(tmp_path).images] == [1, 2, 3]
 
 
+@pytest.mark.parametrize(("last", "ids"), [(2**53, [7, 2**53]), (2**53 + 1, [1, 2]), (10**22, [1, 2])])
+def test_numbers_too_large_for_ids_are_names(tmp_path, last, ids):
+    for number in (7, last):
+        (tmp_path / f"{number}.png").write_bytes(b"")
+    assert [i for i, *_ in open_pictures(tmp_path).images] == ids
+
+
 @pytest.mark.parametrize("suffix", [".json", ".csv", ".parquet"])
 def test_the_same_bytes_for_any_number_of_workers_kept_or_not(folder, tmp_path, suffix):
     files = []
