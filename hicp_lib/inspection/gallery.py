@@ -24,7 +24,7 @@ from hicp_lib.core.keypoints import FACE, GROUPS, HANDS, LIMBS, NAMES
 from hicp_lib.core.names import is_inside
 from hicp_lib.detectors.runtime.to_file import IMAGE_SUFFIXES
 from hicp_lib.evaluation.ap.person_oks import person_oks
-from hicp_lib.formats.annotations import Annotations, rows_by_image
+from hicp_lib.formats.annotations import Annotations, refuse_other_sizes, rows_by_image
 from hicp_lib.formats.detection_files import names_beside, rows_in_parts
 from hicp_lib.formats.json_validation import Rows
 from hicp_lib.inspection.skeletons import draw_people
@@ -128,7 +128,8 @@ def image_paths(
     Raises
     ------
     InputError
-        If the file of an image id is unknown or one of two, or a name leads out of the folder.
+        If the file of an image id is unknown, one of two or of another size than annotated, or a name leads
+        out of the folder.
     """
     if not images.is_dir():
         raise InputError(f"{images}: is not a folder; give the folder that holds the pictures")
@@ -156,6 +157,8 @@ def image_paths(
     for name in names.values():
         if not is_inside(name):
             raise InputError(f"{detections}: file name {name!r} leads out of the folder of pictures")
+    if annotations is not None:
+        refuse_other_sizes(annotations, images)
     return {i: images / name for i, name in names.items()}
 
 

@@ -147,6 +147,7 @@ OF_SET = {"hicp detect": "--dataset, this folder", "hicp evaluate": "--detection
 @case(
     "data set: images and annotations",
     ALL | {"people": "2 in 2 images", "images": "1; pixels: 64 x 48 (1)"},
+    notes=["1 images are not of the annotated size: "],
     needs=OF_SET,
 )
 def dataset_folder(folder):
@@ -155,6 +156,7 @@ def dataset_folder(folder):
 
 @case("HiCP crops: Basic and Headless", {
       "basic": "2 in 2 images", "headless": "2 in 2 images", "layout": "halpe136"},
+      notes=["0.jpg: is 64x48 pixels, annotated as 640x480; expected the image"] * 2,
       needs={"hicp detect": "--dataset, one of them"})  # fmt: skip
 def hicp_folder(folder):
     dataset(folder / "basic")

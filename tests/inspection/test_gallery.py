@@ -116,6 +116,12 @@ def test_a_picture_that_cannot_be_read_is_told_and_the_rest_shown(folder, capsys
     assert len(content((folder / "page.html").read_text())["pictures"]) == 2
 
 
+def test_pictures_of_another_size_than_annotated_are_refused(folder, capsys):
+    write_png(folder / "images" / "b.png", np.zeros((200, 100, 3), np.uint8))
+    assert draw(folder, "--annotations", folder / "annotations.json", "--out", folder / "page.html") == 2
+    assert "b.png: is 100x200 pixels, annotated as 200x200; expected the image" in capsys.readouterr().err
+
+
 def test_names_that_lead_out_of_the_folder_are_refused(tmp_path):
     (tmp_path / "images").mkdir()
     (tmp_path / "d.json").write_text("[]")

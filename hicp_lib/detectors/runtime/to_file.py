@@ -17,7 +17,7 @@ from hicp_lib.core.images import rotation_note
 from hicp_lib.core.video import SUFFIXES as VIDEO_SUFFIXES
 from hicp_lib.core.video import open_video
 from hicp_lib.detectors.runtime.run import Image, boxes_by_image, detect_each
-from hicp_lib.formats.annotations import read_annotations
+from hicp_lib.formats.annotations import read_annotations, refuse_other_sizes
 from hicp_lib.formats.detection_files import json_list, names_beside, open_detections
 from hicp_lib.formats.json_validation import MAX_INTEGER
 
@@ -82,9 +82,10 @@ def open_dataset(folder: Path) -> Pictures:
     Raises
     ------
     InputError
-        If the annotations are absent or malformed.
+        If the annotations are absent or malformed, or of images of another size.
     """
     annotations = read_annotations(folder / "annotations.json")
+    refuse_other_sizes(annotations, folder / "images")
     names = [(i, image.file_name) for i, image in annotations.images.items()]
     return Pictures(folder, _files(folder / "images", names), len(names), boxes_by_image(annotations))
 

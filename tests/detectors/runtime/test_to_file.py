@@ -153,6 +153,23 @@ def test_a_data_set_gives_its_ids_and_names(folder, tmp_path):
     ]  # fmt: skip
 
 
+def test_a_data_set_with_pictures_of_another_size_is_refused_before_anything_is_done(tmp_path, capsys):
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = 6
+    (tmp_path / "images").mkdir()
+    Image.new("RGB", (30, 20)).save(tmp_path / "images" / "turned.jpg", exif=exif)
+    for (width, height), refused in {(30, 20): False, (20, 30): True, (60, 40): True}.items():
+        images = [{"id": 1, "file_name": "turned.jpg", "width": width, "height": height}]
+        content = {"images": images, "annotations": [], "categories": [{"id": 1, "name": "person"}]}
+        (tmp_path / "annotations.json").write_text(json.dumps(content))
+        assert detect("--dataset", tmp_path, "--out", tmp_path / f"{width}.json") == 2 * refused
+        told = f"turned.jpg: is 30x20 pixels as stored (rotation flag 6), annotated as {width}x{height}; exp"
+        assert (told in capsys.readouterr().err) == refused == (not (tmp_path / f"{width}.json").exists())
+        if refused:
+            with pytest.raises(InputError, match=f"annotated as {width}x{height}"):
+                run.detect_dataset("counting", tmp_path)
+
+
 def test_few_results_wait_in_memory_and_all_come_in_order(folder, monkeypatch):
     """While the first image takes its time, the others, which are kept, pass it."""
     list(run.detect_each("counting", enumerate(sorted(folder.iterdir())[1:])))
