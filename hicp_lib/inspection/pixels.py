@@ -10,7 +10,7 @@ from PIL import Image
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, read_json
-from hicp_lib.core.folders import listed
+from hicp_lib.core.folders import listed, passed_over
 from hicp_lib.core.images import image_header, refuse_too_large
 from hicp_lib.core.video import open_video
 from hicp_lib.detectors.mediapipe.bundles import BUNDLES
@@ -60,7 +60,8 @@ def describe_images(folder: Path) -> Facts:
         "cannot be read": sum(not width for width, *_ in headers),
         "were not looked into": len(paths) - len(headers),
     }  # fmt: skip
-    notes = [f"{n} images {what}" for what, n in counts.items() if n]
+    rest = passed_over(folder, IMAGE_SUFFIXES)
+    notes = [*(f"{n} images {what}" for what, n in counts.items() if n), *[rest] * bool(rest)]
     return Facts({"images": f"{len(paths)}; pixels: {shown or 'none'}"}, notes)
 
 

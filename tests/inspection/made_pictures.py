@@ -125,12 +125,13 @@ def another_archive(folder):
 
 
 @case("folder of images", {"images": "3; pixels: 64 x 48 (2)"},
-      notes=["1 images have a rotation flag", "1 images cannot"],
+      notes=["1 images have a rotation flag", "1 images cannot", "1 others (.gif) passed over"],
       needs={"hicp detect": "this folder", "hicp dataset create": "--annotations"})  # fmt: skip
 def image_folder(folder):
     flagged(folder / "a.jpg", 6)
     flagged(folder / "b.JPG", 1)
     (folder / "c.png").write_bytes(b"no picture")
+    (folder / "d.gif").touch()
     return folder
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import atomic_path
-from hicp_lib.core.folders import listed
+from hicp_lib.core.folders import listed, passed_over
 from hicp_lib.core.images import rotation_note
 from hicp_lib.core.video import SUFFIXES as VIDEO_SUFFIXES
 from hicp_lib.core.video import open_video
@@ -41,12 +41,15 @@ class Pictures:
         Their expected number; None if unknown.
     boxes_px : mapping of int to array, optional
         Annotated boxes by image id.
+    note : str, optional
+        What of the folder is passed over.
     """
 
     source: Path
     images: Iterable[tuple[int, Facts, Image]]
     n_images: int | None
     boxes_px: Mapping[int, np.ndarray] | None = None
+    note: str = ""
 
 
 def open_pictures(source: Path) -> Pictures:
@@ -66,14 +69,16 @@ def open_pictures(source: Path) -> Pictures:
         return Pictures(source, images, n_frames or None)
     if not source.is_dir():
         raise InputError(f"{source}: is not a folder; give the folder that holds the images, or a video")
-    names = listed(source, IMAGE_SUFFIXES)
+    names, rest = listed(source, IMAGE_SUFFIXES), passed_over(source, IMAGE_SUFFIXES)
     if not names:
-        raise InputError(f"{source}: holds no images; expected files such as 000001.jpg or photo.png")
+        what = f"holds no images{rest and f', {rest}'}"
+        raise InputError(f"{source}: {what}; expected files such as 000001.jpg or photo.png")
     stems = [os.path.splitext(name)[0] for name in names]
     numbers = {int(stem) for stem in stems if stem.isascii() and stem.isdigit()}
     are_ids = len(numbers) == len(names) and max(numbers) <= MAX_INTEGER
     ids = map(int, stems) if are_ids else range(1, len(names) + 1)
-    return Pictures(source, _files(source, zip(ids, names, strict=True)), len(names))
+    note = rest and f"{source}: {rest}; images end in {', '.join(IMAGE_SUFFIXES)}"
+    return Pictures(source, _files(source, zip(ids, names, strict=True)), len(names), note=note)
 
 
 def open_dataset(folder: Path) -> Pictures:
@@ -131,6 +136,8 @@ def detect_to_file(
     n_people = n_images = n_broken = 0
     n, known, flagged = pictures.n_images, dict[int, Facts](), dict[str, int]()
     images = (known.update({i: facts}) or (i, image) for i, facts, image in pictures.images)
+    if pictures.note:
+        tell(pictures.note)
     each = detect_each(name, images, boxes_px=pictures.boxes_px, n_images=n, flagged=flagged, **options)
     with ExitStack() as stack:
         append = stack.enter_context(json_list(stack.enter_context(atomic_path(names_beside(out)))))

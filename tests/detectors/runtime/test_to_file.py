@@ -47,6 +47,21 @@ def test_numbers_in_names_are_in_their_order(folder, tmp_path):
     assert [row["keypoints"][0] for row in rows] == list(range(12))
 
 
+def test_what_is_passed_over_in_a_folder_is_told(folder, tmp_path, capsys):
+    (folder / "sub").mkdir()
+    for name in ("b.gif", "c.HEIC", "d.heic", ".hidden"):
+        (folder / name).touch()
+    assert detect("--images", folder, "--out", tmp_path / "d.json") == 0
+    told = capsys.readouterr().err
+    assert told.startswith(f"{folder}: 4 others (.gif, .heic, folders) passed over; images end in .jpg, ")
+    assert detect("--images", folder / "sub", "--out", tmp_path / "d.json") == 2
+    (folder / "sub" / "c.gif").touch()
+    assert detect("--images", folder / "sub", "--out", tmp_path / "d.json") == 2
+    first, second = capsys.readouterr().err.splitlines()
+    assert "sub: holds no images; expected" in first
+    assert "sub: holds no images, 1 others (.gif) passed over; expected" in second
+
+
 def test_a_rotation_flag_is_told_kept_results_or_not(folder, tmp_path, capsys):
     exif = Image.Exif()
     exif[ExifTags.Base.Orientation] = 6
