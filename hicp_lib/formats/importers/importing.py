@@ -171,7 +171,8 @@ def _summary(
 def summary_lines(summary: dict[str, Any]) -> list[str]:
     """The summary of an import as text lines."""
     low, middle, high = summary["score_range"]
-    scale, n_cut, unmatched = (summary[key] for key in ("score_scale", "n_cut", "unmatched"))
+    keys = "score_scale", "n_cut", "unmatched", "n_passed_over"
+    scale, n_cut, unmatched, rest = (summary[key] for key in keys)
     scaled = f"divided by {scale:g}" if scale != 1 else "taken as they are"
     named = f" ({', '.join(map(repr, unmatched[:3]))}{', ...' if len(unmatched) > 3 else ''})"
     per_convention = ", ".join(f"{name} {n}" for name, n in summary["conventions"].items())
@@ -182,6 +183,5 @@ def summary_lines(summary: dict[str, Any]) -> list[str]:
         f"keypoint scores {low:.3g} to {high:.3g}, median {middle:.3g}: {scaled}, {n_cut} cut to 1",
         "keypoints outside their image: {n_outside} of {n_keypoints}".format(**summary),
         f"not annotated and left out: {len(unmatched)} images{named if unmatched else ''}",
-        *["passed over: {n_passed_over} files in JSON, not named as the others".format(**summary)]
-        * bool(summary["n_passed_over"]),
+        *([f"passed over: {rest} files in JSON, not named as the others"] if rest else []),
     ]
