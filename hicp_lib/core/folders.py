@@ -13,6 +13,8 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import cache_dir, held, natural_order, partial_name, read_json, remove_left
 from hicp_lib.core.names import is_inside
 
+_MOST_ENDINGS = 8  # that are named
+
 
 def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "", what: str = "a folder") -> list[str]:
     """Names in a folder in natural order (numbers by value), without hidden ones.
@@ -39,6 +41,26 @@ def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "", what: str =
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); give {what}") from None
     return sorted((n for n in names if n[0] != "." and n.lower().endswith(suffixes)), key=natural_order)
+
+
+def passed_over(folder: str | Path, suffixes: tuple[str, ...]) -> str:
+    """How many things in a folder `listed` leaves out by their endings, and which those are; empty for none.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     for name in ("a.png", "b.gif", "c.GIF"):
+    ...         Path(folder, name).touch()
+    ...     Path(folder, "sub").mkdir()
+    ...     passed_over(folder, (".png",)), passed_over(folder, (".png", ".gif", "sub"))
+    ('3 others (.gif, folders) passed over', '')
+    """
+    others = [Path(folder, name) for name in listed(folder) if not name.lower().endswith(suffixes)]
+    kinds = ["folders" if path.is_dir() else path.suffix.lower() or "no ending" for path in others]
+    more = ", ..." * (len(set(kinds)) > _MOST_ENDINGS)
+    shown = ", ".join([*dict.fromkeys(kinds)][:_MOST_ENDINGS])
+    return f"{len(others)} others ({shown}{more}) passed over" if others else ""
 
 
 def kept_beside(folder: Path, name: str, **kinds: type) -> dict[str, Any]:

@@ -303,11 +303,7 @@ def _write_crops(images_dir: Path, turned: dict[str, int], image: ImageInfo, cro
     if not missing:
         return
     pixels = as_seen(read_image(images_dir / image.file_name), turned.get(image.file_name, 1))
-    if pixels.shape[:2] != (image.height_px, image.width_px):
-        size, annotated = f"{pixels.shape[1]}x{pixels.shape[0]}", f"{image.width_px}x{image.height_px}"
-        raise InputError(
-            f"{images_dir / image.file_name}: is {size} pixels, annotated as {annotated}; "
-            "expected the image the annotations were made on"
-        )
+    if problem := image.other_size(images_dir, pixels.shape[1::-1]):
+        raise InputError(problem)
     for path, (left, top, right, bottom) in missing:
         write_png(path, pixels[top:bottom, left:right])

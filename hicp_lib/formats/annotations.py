@@ -26,6 +26,7 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import write_json
+from hicp_lib.core.images import image_header
 from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS, NAMES
 from hicp_lib.core.names import is_inside
 from hicp_lib.formats.cropcoco import FLAG_OUTSIDE, OUTSIDE, outside_from_flags
@@ -62,6 +63,30 @@ class ImageInfo:
     file_name: str
     width_px: int
     height_px: int
+
+    def other_size(self, folder: Path, size_px: tuple[int, ...] = ()) -> str:
+        """That its file is not of the annotated size; empty where it is, or cannot be read.
+
+        Parameters
+        ----------
+        folder : Path
+            Of the images.
+        size_px : tuple of int, optional
+            Width and height found; by default those in the file's header, as stored.
+
+        Returns
+        -------
+        str
+        """
+        *header_px, flag = (*size_px, 1) if size_px else image_header(folder / self.file_name)
+        width_px, height_px = header_px
+        if not width_px or (width_px, height_px) == (self.width_px, self.height_px):
+            return ""
+        as_stored = f" as stored (rotation flag {flag})" if flag > 1 else ""
+        return (
+            f"{folder / self.file_name}: is {width_px}x{height_px} pixels{as_stored}, annotated as "
+            f"{self.width_px}x{self.height_px}; expected the image the annotations were made on"
+        )
 
 
 @dataclass(frozen=True)
@@ -174,6 +199,13 @@ def source_images(annotations: Annotations) -> dict[int, int]:
     for image_id, extra in zip(annotations.image_ids.tolist(), annotations.extras, strict=True):
         source[image_id] = extra.get("source_image_id", source[image_id])
     return source
+
+
+def refuse_other_sizes(annotations: Annotations, images_dir: Path) -> None:
+    """Refuse images of another size than annotated, as `ImageInfo.other_size` says."""
+    for image in annotations.images.values():
+        if problem := image.other_size(images_dir):
+            raise InputError(problem)
 
 
 def read_annotations(path: str | Path, keypoint_map: str | Path | None = None) -> Annotations:

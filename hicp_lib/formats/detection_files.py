@@ -60,7 +60,7 @@ def refuse_other_suffix(path: str | Path, suffixes: Sequence[str] = SUFFIXES) ->
 
 @contextmanager
 def open_detections(path: str | Path) -> Iterator[_Append]:
-    """Write a file of detections, whole or not at all.
+    """Write a file of detections, whole or not at all; a list of images beside the earlier one is removed.
 
     Parameters
     ----------
@@ -85,6 +85,18 @@ def open_detections(path: str | Path) -> Iterator[_Append]:
         yield lambda image_id, facts, found, extras=None: append(
             *result_rows(image_id, facts, found, extras if is_json else None)
         )
+    names_beside(path).unlink(missing_ok=True)
+
+
+def names_beside(path: str | Path) -> Path:
+    """The list of a file's images that `hicp detect` writes beside it, those without people too.
+
+    Examples
+    --------
+    >>> names_beside("out/d.csv").name
+    'd.csv.images.json'
+    """
+    return Path(f"{path}.images.json")
 
 
 @contextmanager

@@ -6,7 +6,8 @@ without by the lowest score of a person. Images without detected or annotated pe
 
 import base64
 import json
-from collections.abc import Callable, Iterator, Mapping
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,12 +18,15 @@ from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_bytes
+from hicp_lib.core.folders import listed
 from hicp_lib.core.images import read_image, write_png
 from hicp_lib.core.keypoints import FACE, GROUPS, HANDS, LIMBS, NAMES
 from hicp_lib.core.names import is_inside
+from hicp_lib.detectors.runtime.to_file import IMAGE_SUFFIXES
 from hicp_lib.evaluation.ap.person_oks import person_oks
-from hicp_lib.formats.annotations import Annotations, rows_by_image
-from hicp_lib.formats.detection_files import read_rows
+from hicp_lib.formats.annotations import Annotations, refuse_other_sizes, rows_by_image
+from hicp_lib.formats.detection_files import names_beside, rows_in_parts
+from hicp_lib.formats.json_validation import Rows
 from hicp_lib.inspection.skeletons import draw_people
 
 MAX_SIDE_PX = 960  # images on a page are not larger than this
@@ -105,7 +109,7 @@ def _truth(people: Annotations) -> dict[int, Detections]:
 def image_paths(
     detections: Path, images: Path, found: Mapping[int, Detections], annotations: Annotations | None
 ) -> dict[int, Path]:
-    """The file of each image id: by the annotations, or by names in or next to the detections.
+    """The file of each image id: by the annotations, names in or next to the detections, or numbers as names.
 
     Parameters
     ----------
@@ -124,23 +128,37 @@ def image_paths(
     Raises
     ------
     InputError
-        If the file of an image id is unknown, or a name leads out of the folder.
+        If the file of an image id is unknown, one of two or of another size than annotated, or a name leads
+        out of the folder.
     """
     if not images.is_dir():
         raise InputError(f"{images}: is not a folder; give the folder that holds the pictures")
     known = {} if annotations is None else annotations.images
     names: dict = {i: image.file_name for i, image in known.items()}
+
+    def add(path: Path, rows: Iterable[dict], key: str, advice: str = "give --annotations") -> None:
+        for row in rows:
+            i, name = row.get(key), row.get("file_name")
+            if isinstance(i, int) and isinstance(name, str) and names.setdefault(i, name) != name:
+                raise InputError(f"{path}: image {i} may be {names[i]!r} or {name!r}; {advice}")
+
     if annotations is None:
-        beside = detections.with_suffix(".images.json")
-        rows = read_json(beside) if beside.is_file() else read_rows(detections)
-        named = [row for row in rows if isinstance(row, dict) and isinstance(row.get("file_name"), str)]
-        names = {row.get("id", row.get("image_id")): row["file_name"] for row in named if "frame" not in row}
-        names = names or {int(path.stem): path.name for path in images.iterdir() if path.stem.isdecimal()}
+        found_in = (row for part in rows_in_parts(detections) for row in part)
+        add(detections, (row for row in found_in if "frame" not in row), "image_id")
+        if (beside := names_beside(detections)).is_file():
+            rows = Rows.of(beside, "images", read_json(beside)).rows
+            add(beside, rows, "id", f"remove it if it is not the list of {detections.name}")
+        if not names:
+            named = ((os.path.splitext(name)[0], name) for name in listed(images, IMAGE_SUFFIXES))
+            numbers = [(int(stem), name) for stem, name in named if stem.isascii() and stem.isdigit()]
+            add(images, ({"id": i, "file_name": name} for i, name in numbers), "id")
     for i in found.keys() - names.keys():
         raise InputError(f"{detections}: nothing says which picture image {i} is; give --annotations")
     for name in names.values():
         if not is_inside(name):
             raise InputError(f"{detections}: file name {name!r} leads out of the folder of pictures")
+    if annotations is not None:
+        refuse_other_sizes(annotations, images)
     return {i: images / name for i, name in names.items()}
 
 

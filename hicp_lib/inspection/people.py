@@ -1,6 +1,7 @@
 """Describe annotations and detections."""
 
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ from hicp_lib.formats.json_validation import PART_KEYS
 from hicp_lib.formats.layouts import layouts_of
 from hicp_lib.formats.units import count_fractions, refuse_fractions
 from hicp_lib.inspection.facts import Facts, about_people, about_times, tables
+
+MOST_HEADERS = 2000  # number of images of a folder that are examined
 
 
 def describe_predictions(path: Path, tool: str, origin: str = "") -> Facts:
@@ -62,12 +65,14 @@ def _scores(tool: str, people: People) -> tuple[str, dict[str, str]]:
         return f"{span}: {str(error).partition('; ')[2]}", {"hicp import": "--score-scale"}
 
 
-def describe_annotations(path: Path) -> Facts:
+def describe_annotations(path: Path, images_dir: Path | None = None) -> Facts:
     """Say what annotated people a file in COCO's layout holds.
 
     Parameters
     ----------
     path : Path
+    images_dir : Path, optional
+        Folder of the images; the sizes of the first are compared with those annotated.
 
     Returns
     -------
@@ -87,9 +92,12 @@ def describe_annotations(path: Path) -> Facts:
     if len(people):
         says["area"] = f"{np.median(people.areas_px2 / boxes_px2):.2f} of the box in the median"
     written = ["hicp export wrote these: import --format coco"] * any("confidence" in row for row in rows)
+    looked_at = islice(people.images.values(), MOST_HEADERS if images_dir else 0)
+    other = [problem for image in looked_at if (problem := image.other_size(images_dir or path))]
+    sizes = [f"{len(other)} images are not of the annotated size: {other[0]}"] if other else []
     hands = (people.visibility[:, HANDS] > 0).any()
     needs = {} if hands else {"hicp evaluate": "(the body only: no hand is labelled)"}
-    return Facts(says, [*written, *people.notes.values()], needs)
+    return Facts(says, [*written, *sizes, *people.notes.values()], needs)
 
 
 def _layout(rows: list[dict], names: Sequence[str]) -> str:

@@ -10,16 +10,14 @@ from PIL import Image
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, read_json
-from hicp_lib.core.folders import listed
+from hicp_lib.core.folders import listed, passed_over
 from hicp_lib.core.images import image_header, refuse_too_large
 from hicp_lib.core.video import open_video
 from hicp_lib.detectors.mediapipe.bundles import BUNDLES
 from hicp_lib.detectors.onnx.model_file import read_model
 from hicp_lib.detectors.runtime.to_file import IMAGE_SUFFIXES
 from hicp_lib.inspection.facts import Facts, about_times
-from hicp_lib.inspection.people import describe_annotations
-
-_MOST_HEADERS = 2000  # number of images of a folder that are examined
+from hicp_lib.inspection.people import MOST_HEADERS, describe_annotations
 
 
 def describe_image(path: Path) -> Facts:
@@ -53,7 +51,7 @@ def describe_video(path: Path) -> Facts:
 def describe_images(folder: Path) -> Facts:
     """Say what images a folder holds; pixels are not read."""
     paths = [folder / name for name in listed(folder, IMAGE_SUFFIXES)]
-    headers = [image_header(path) if path.is_file() else (0, 0, 1) for path in paths[:_MOST_HEADERS]]
+    headers = [image_header(path) if path.is_file() else (0, 0, 1) for path in paths[:MOST_HEADERS]]
     sizes = Counter(f"{width} x {height}" for width, height, _ in headers if width)
     shown = ", ".join(f"{size} ({n})" for size, n in sizes.most_common(3)) + ", ..." * (len(sizes) > 3)
     turned = "have a rotation flag (EXIF): viewers turn them, here they are as stored"
@@ -62,13 +60,15 @@ def describe_images(folder: Path) -> Facts:
         "cannot be read": sum(not width for width, *_ in headers),
         "were not looked into": len(paths) - len(headers),
     }  # fmt: skip
-    notes = [f"{n} images {what}" for what, n in counts.items() if n]
+    rest = passed_over(folder, IMAGE_SUFFIXES)
+    notes = [*(f"{n} images {what}" for what, n in counts.items() if n), *[rest] * bool(rest)]
     return Facts({"images": f"{len(paths)}; pixels: {shown or 'none'}"}, notes)
 
 
 def describe_dataset(folder: Path) -> Facts:
     """Say what a folder with `images/` and `annotations.json` holds."""
-    images, facts = describe_images(folder / "images"), describe_annotations(folder / "annotations.json")
+    images = describe_images(folder / "images")
+    facts = describe_annotations(folder / "annotations.json", folder / "images")
     return Facts(facts.says | images.says, [*images.notes, *facts.notes], facts.needs)
 
 

@@ -61,10 +61,45 @@ def test_a_page_shows_the_worst_first_and_holds_all_it_needs(folder, capsys):
 def test_without_annotations_names_come_from_beside_the_detections(folder):
     assert draw(folder, "--out", folder / "page.html") == 2  # nothing says which picture image 1 is
     names = [{"id": i, "file_name": name} for i, name in NAMES.items()]
-    (folder / "detections.images.json").write_text(json.dumps(names))
+    (folder / "detections.json.images.json").write_text(json.dumps(names))
     assert draw(folder, "--out", folder / "page.html", "--limit", 2) == 0
     page = content((folder / "page.html").read_text())
     assert len(page["pictures"]) == 2 and not page["has_truth"] and page["pictures"][0]["truth"] == []
+
+
+def test_names_in_the_file_count_and_a_list_of_others_is_refused(folder, capsys):
+    rows = json.loads((folder / "detections.json").read_text())
+    named = [row | {"file_name": NAMES[row["image_id"]], "id": 3} for row in rows]
+    (folder / "detections.json").write_text(json.dumps(named))
+    beside = folder / "detections.json.images.json"
+    (folder / "detections.images.json").write_text('[{"id": 1, "file_name": "b.png"}]')  # of another file
+    assert draw(folder, "--out", folder / "page.html") == 0
+    shown = content((folder / "page.html").read_text())["pictures"]
+    assert {picture["name"] for picture in shown} == set(NAMES.values())
+    for text, problem in {
+        '[{"id": 1, "file_name": "b.png"}]': "image 1 may be 'a.png' or 'b.png'; remove it if it is not the",
+        "3": "images is 3; expected a list",
+    }.items():
+        beside.write_text(text)
+        assert draw(folder, "--out", folder / "page.html") == 2
+        assert f"{beside}: {problem}" in capsys.readouterr().err
+    write_detections(folder / "detections.json", {})  # other results: the list goes with the earlier ones
+    assert not beside.exists()
+
+
+def test_an_id_of_two_pictures_is_refused(folder, capsys):
+    rows = json.loads((folder / "detections.json").read_text())
+    doubled = [row | {"file_name": name, "image_id": 1} for row in rows for name in ("a.png", "b.png")]
+    (folder / "doubled.json").write_text(json.dumps(doubled))
+    out = ["--images", str(folder / "images"), "--out", str(folder / "page.html")]
+    assert run(["draw", "--detections", str(folder / "doubled.json"), *out]) == 2
+    assert "doubled.json: image 1 may be 'a.png' or 'b.png'; give --annotations" in capsys.readouterr().err
+    for name in ("1.png", "2.png", "3.png", "003.txt"):
+        (folder / "images" / name).write_bytes((folder / "images" / "a.png").read_bytes())
+    assert draw(folder, "--out", folder / "page.html") == 0  # by numbers; other files are no pictures
+    (folder / "images" / "001.png").write_bytes(b"")
+    assert draw(folder, "--out", folder / "page.html") == 2
+    assert "images: image 1 may be '001.png' or '1.png'" in capsys.readouterr().err
 
 
 def test_png_files_are_drawn_and_numbered(folder):
@@ -81,10 +116,16 @@ def test_a_picture_that_cannot_be_read_is_told_and_the_rest_shown(folder, capsys
     assert len(content((folder / "page.html").read_text())["pictures"]) == 2
 
 
+def test_pictures_of_another_size_than_annotated_are_refused(folder, capsys):
+    write_png(folder / "images" / "b.png", np.zeros((200, 100, 3), np.uint8))
+    assert draw(folder, "--annotations", folder / "annotations.json", "--out", folder / "page.html") == 2
+    assert "b.png: is 100x200 pixels, annotated as 200x200; expected the image" in capsys.readouterr().err
+
+
 def test_names_that_lead_out_of_the_folder_are_refused(tmp_path):
     (tmp_path / "images").mkdir()
     (tmp_path / "d.json").write_text("[]")
-    (tmp_path / "d.images.json").write_text('[{"id": 1, "file_name": "../secret.png"}]')
+    (tmp_path / "d.json.images.json").write_text('[{"id": 1, "file_name": "../secret.png"}]')
     with pytest.raises(InputError, match="leads out"):
         image_paths(tmp_path / "d.json", tmp_path / "images", {1: Detections.none()}, None)
 

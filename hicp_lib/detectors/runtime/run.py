@@ -32,7 +32,7 @@ from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime import results
 from hicp_lib.detectors.runtime.isolation import IsolationError
 from hicp_lib.detectors.runtime.results import Key, Runner, Timed
-from hicp_lib.formats.annotations import Annotations, read_annotations, rows_by_image
+from hicp_lib.formats.annotations import Annotations, read_annotations, refuse_other_sizes, rows_by_image
 
 Image = str | Path | np.ndarray  # a file, or RGB, shape (height, width, 3), uint8
 _MOST_WAITING = 4096  # results in memory that wait for an earlier image's
@@ -92,7 +92,13 @@ def detect_annotated(
     Returns
     -------
     dict of int to Timed
+
+    Raises
+    ------
+    InputError
+        If an image is of another size than annotated; and as of `detect_images`.
     """
+    refuse_other_sizes(annotations, Path(images_dir))
     paths = {i: Path(images_dir) / image.file_name for i, image in annotations.images.items()}
     return detect_images(name, paths, boxes_px=boxes_by_image(annotations), **options)
 

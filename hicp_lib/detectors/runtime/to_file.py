@@ -12,13 +12,14 @@ import numpy as np
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import atomic_path
-from hicp_lib.core.folders import listed
+from hicp_lib.core.folders import listed, passed_over
 from hicp_lib.core.images import rotation_note
 from hicp_lib.core.video import SUFFIXES as VIDEO_SUFFIXES
 from hicp_lib.core.video import open_video
 from hicp_lib.detectors.runtime.run import Image, boxes_by_image, detect_each
-from hicp_lib.formats.annotations import read_annotations
-from hicp_lib.formats.detection_files import json_list, open_detections
+from hicp_lib.formats.annotations import read_annotations, refuse_other_sizes
+from hicp_lib.formats.detection_files import json_list, names_beside, open_detections
+from hicp_lib.formats.json_validation import MAX_INTEGER
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff")
 
@@ -40,19 +41,22 @@ class Pictures:
         Their expected number; None if unknown.
     boxes_px : mapping of int to array, optional
         Annotated boxes by image id.
+    note : str, optional
+        What of the folder is passed over.
     """
 
     source: Path
     images: Iterable[tuple[int, Facts, Image]]
     n_images: int | None
     boxes_px: Mapping[int, np.ndarray] | None = None
+    note: str = ""
 
 
 def open_pictures(source: Path) -> Pictures:
     """The images of a folder, or the frames of a video.
 
-    Image ids are COCO's if files are named that way (000000012345.jpg is 12345), else they count files in
-    natural order; for a video, frames from 0.
+    Image ids are COCO's if files are named that way (000000012345.jpg is 12345, up to `MAX_INTEGER`), else
+    they count files in natural order; for a video, frames from 0.
 
     Raises
     ------
@@ -65,13 +69,16 @@ def open_pictures(source: Path) -> Pictures:
         return Pictures(source, images, n_frames or None)
     if not source.is_dir():
         raise InputError(f"{source}: is not a folder; give the folder that holds the images, or a video")
-    names = listed(source, IMAGE_SUFFIXES)
+    names, rest = listed(source, IMAGE_SUFFIXES), passed_over(source, IMAGE_SUFFIXES)
     if not names:
-        raise InputError(f"{source}: holds no images; expected files such as 000001.jpg or photo.png")
+        what = f"holds no images{rest and f', {rest}'}"
+        raise InputError(f"{source}: {what}; expected files such as 000001.jpg or photo.png")
     stems = [os.path.splitext(name)[0] for name in names]
     numbers = {int(stem) for stem in stems if stem.isascii() and stem.isdigit()}
-    ids = map(int, stems) if len(numbers) == len(names) else range(1, len(names) + 1)
-    return Pictures(source, _files(source, zip(ids, names, strict=True)), len(names))
+    are_ids = len(numbers) == len(names) and max(numbers) <= MAX_INTEGER
+    ids = map(int, stems) if are_ids else range(1, len(names) + 1)
+    note = rest and f"{source}: {rest}; images end in {', '.join(IMAGE_SUFFIXES)}"
+    return Pictures(source, _files(source, zip(ids, names, strict=True)), len(names), note=note)
 
 
 def open_dataset(folder: Path) -> Pictures:
@@ -80,9 +87,10 @@ def open_dataset(folder: Path) -> Pictures:
     Raises
     ------
     InputError
-        If the annotations are absent or malformed.
+        If the annotations are absent or malformed, or of images of another size.
     """
     annotations = read_annotations(folder / "annotations.json")
+    refuse_other_sizes(annotations, folder / "images")
     names = [(i, image.file_name) for i, image in annotations.images.items()]
     return Pictures(folder, _files(folder / "images", names), len(names), boxes_by_image(annotations))
 
@@ -97,8 +105,7 @@ def detect_to_file(
 ) -> tuple[int, int, int]:  # fmt: skip
     """Detect people and write them, image by image; images that cannot be read are skipped.
 
-    `OUT.images.json` next to `out` names all images, including those without people, and those that could not
-    be read.
+    `names_beside(out)` lists all images, including those without people, and those that could not be read.
 
     Parameters
     ----------
@@ -129,11 +136,12 @@ def detect_to_file(
     n_people = n_images = n_broken = 0
     n, known, flagged = pictures.n_images, dict[int, Facts](), dict[str, int]()
     images = (known.update({i: facts}) or (i, image) for i, facts, image in pictures.images)
+    if pictures.note:
+        tell(pictures.note)
     each = detect_each(name, images, boxes_px=pictures.boxes_px, n_images=n, flagged=flagged, **options)
     with ExitStack() as stack:
-        write = stack.enter_context(open_detections(out))
-        listed = stack.enter_context(atomic_path(out.with_suffix(".images.json")))
-        append = stack.enter_context(json_list(listed))
+        append = stack.enter_context(json_list(stack.enter_context(atomic_path(names_beside(out)))))
+        write = stack.enter_context(open_detections(out))  # left first: it removes an earlier list
         for image_id, found in stack.enter_context(closing(each)):
             facts = known.pop(image_id)
             if isinstance(found, InputError):

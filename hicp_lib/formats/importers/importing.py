@@ -16,6 +16,7 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, refuse_unknown
+from hicp_lib.core.folders import listed
 from hicp_lib.core.images import inside
 from hicp_lib.formats.annotations import Annotations, rows_by_image
 from hicp_lib.formats.importers.matching import ImageMatcher
@@ -56,7 +57,7 @@ class Imported:
         out; `n_people` imported; `conventions`, people per keypoint convention, unmatched ones included;
         `score_range`, lowest, median and highest keypoint score as the tool wrote them; `score_scale`, what
         they were divided by, and `n_cut`, how many were then clipped to 1; `n_keypoints` given, and
-        `n_outside` of their image.
+        `n_outside` of their image; `n_passed_over`, files in JSON that are not named as the others.
     """
 
     detections: dict[int, Detections]
@@ -144,7 +145,7 @@ def _summary(
     format: str, people: People, matched: list[int | None], annotations: Annotations, rows: np.ndarray,
     sizes_px: np.ndarray, scale: float,
 ) -> dict[str, Any]:  # fmt: skip
-    points, raw = people.keypoints_px[rows], people.raw_scores[rows]
+    points, raw, path = people.keypoints_px[rows], people.raw_scores[rows], people.path
     given = np.isfinite(points).all(axis=-1)
     outside = given & ~inside(points, (0, 0, *sizes_px.T[..., None]))
     n_mentioned = sum(image is not None for image in matched)
@@ -163,13 +164,15 @@ def _summary(
         "n_cut": int((raw > scale).sum()),
         "n_keypoints": int(given.sum()),
         "n_outside": int(outside.sum()),
+        "n_passed_over": len(listed(path, ".json")) - len(people.sources) if path.is_dir() else 0,
     }
 
 
 def summary_lines(summary: dict[str, Any]) -> list[str]:
     """The summary of an import as text lines."""
     low, middle, high = summary["score_range"]
-    scale, n_cut, unmatched = (summary[key] for key in ("score_scale", "n_cut", "unmatched"))
+    keys = "score_scale", "n_cut", "unmatched", "n_passed_over"
+    scale, n_cut, unmatched, rest = (summary[key] for key in keys)
     scaled = f"divided by {scale:g}" if scale != 1 else "taken as they are"
     named = f" ({', '.join(map(repr, unmatched[:3]))}{', ...' if len(unmatched) > 3 else ''})"
     per_convention = ", ".join(f"{name} {n}" for name, n in summary["conventions"].items())
@@ -180,4 +183,5 @@ def summary_lines(summary: dict[str, Any]) -> list[str]:
         f"keypoint scores {low:.3g} to {high:.3g}, median {middle:.3g}: {scaled}, {n_cut} cut to 1",
         "keypoints outside their image: {n_outside} of {n_keypoints}".format(**summary),
         f"not annotated and left out: {len(unmatched)} images{named if unmatched else ''}",
+        *([f"passed over: {rest} files in JSON, not named as the others"] if rest else []),
     ]

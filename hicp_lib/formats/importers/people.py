@@ -122,7 +122,7 @@ def json_files(folder: Path, endings: tuple[str, ...], what: str) -> dict[str, P
     InputError
         If it is not a folder, or contains no such file.
     """
-    names = [name for name in listed(folder, what=what) if name[0] != "_"]
+    names = listed(folder, what=what)
     for ending in endings:
         files = {n.removesuffix(ending): folder / n for n in names if n.endswith(ending)}
         if files:

@@ -47,6 +47,21 @@ def test_numbers_in_names_are_in_their_order(folder, tmp_path):
     assert [row["keypoints"][0] for row in rows] == list(range(12))
 
 
+def test_what_is_passed_over_in_a_folder_is_told(folder, tmp_path, capsys):
+    (folder / "sub").mkdir()
+    for name in ("b.gif", "c.HEIC", "d.heic", ".hidden"):
+        (folder / name).touch()
+    assert detect("--images", folder, "--out", tmp_path / "d.json") == 0
+    told = capsys.readouterr().err
+    assert told.startswith(f"{folder}: 4 others (.gif, .heic, folders) passed over; images end in .jpg, ")
+    assert detect("--images", folder / "sub", "--out", tmp_path / "d.json") == 2
+    (folder / "sub" / "c.gif").touch()
+    assert detect("--images", folder / "sub", "--out", tmp_path / "d.json") == 2
+    first, second = capsys.readouterr().err.splitlines()
+    assert "sub: holds no images; expected" in first
+    assert "sub: holds no images, 1 others (.gif) passed over; expected" in second
+
+
 def test_a_rotation_flag_is_told_kept_results_or_not(folder, tmp_path, capsys):
     exif = Image.Exif()
     exif[ExifTags.Base.Orientation] = 6
@@ -62,6 +77,13 @@ def test_image_numbers_are_those_of_coco_or_the_order_of_names(tmp_path):
     assert [i for i, *_ in open_pictures(tmp_path).images] == [139, 285]
     (tmp_path / "photo.png").write_bytes(b"")
     assert [i for i, *_ in open_pictures(tmp_path).images] == [1, 2, 3]
+
+
+@pytest.mark.parametrize(("last", "ids"), [(2**53, [7, 2**53]), (2**53 + 1, [1, 2]), (10**22, [1, 2])])
+def test_numbers_too_large_for_ids_are_names(tmp_path, last, ids):
+    for number in (7, last):
+        (tmp_path / f"{number}.png").write_bytes(b"")
+    assert [i for i, *_ in open_pictures(tmp_path).images] == ids
 
 
 @pytest.mark.parametrize("suffix", [".json", ".csv", ".parquet"])
@@ -81,7 +103,7 @@ def test_a_broken_picture_does_not_lose_the_folder(folder, tmp_path, capsys):
     output, errors = capsys.readouterr()
     assert output.startswith(f"{tmp_path / 'd.json'}: 10 people in 10 images; 2 could not be read\n")
     assert errors.count("is not an image") == 2 and "shot_5.png" in errors and "shot_7.png" in errors
-    images = json.loads((tmp_path / "d.images.json").read_text())
+    images = json.loads((tmp_path / "d.json.images.json").read_text())
     assert [image["id"] for image in images if "error" in image] == [6, 8]
     assert 6 not in {row["image_id"] for row in json.loads((tmp_path / "d.json").read_text())}
 
@@ -144,6 +166,23 @@ def test_a_data_set_gives_its_ids_and_names(folder, tmp_path):
     assert [(row["image_id"], row["file_name"], row["keypoints"][0]) for row in rows] == [
         (74, "shot_4.png", 4), (72, "shot_2.png", 2),
     ]  # fmt: skip
+
+
+def test_a_data_set_with_pictures_of_another_size_is_refused_before_anything_is_done(tmp_path, capsys):
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = 6
+    (tmp_path / "images").mkdir()
+    Image.new("RGB", (30, 20)).save(tmp_path / "images" / "turned.jpg", exif=exif)
+    for (width, height), refused in {(30, 20): False, (20, 30): True, (60, 40): True}.items():
+        images = [{"id": 1, "file_name": "turned.jpg", "width": width, "height": height}]
+        content = {"images": images, "annotations": [], "categories": [{"id": 1, "name": "person"}]}
+        (tmp_path / "annotations.json").write_text(json.dumps(content))
+        assert detect("--dataset", tmp_path, "--out", tmp_path / f"{width}.json") == 2 * refused
+        told = f"turned.jpg: is 30x20 pixels as stored (rotation flag 6), annotated as {width}x{height}; exp"
+        assert (told in capsys.readouterr().err) == refused == (not (tmp_path / f"{width}.json").exists())
+        if refused:
+            with pytest.raises(InputError, match=f"annotated as {width}x{height}"):
+                run.detect_dataset("counting", tmp_path)
 
 
 def test_few_results_wait_in_memory_and_all_come_in_order(folder, monkeypatch):

@@ -264,7 +264,7 @@ def test_mmpose_without_boxes_ranks_by_keypoints(tmp_path, images):
 
 @pytest.mark.parametrize(("names", "told"), [("abc", "'a', 'b', 'c'"), ("abcd", "'a', 'b', 'c', ...")])
 def test_of_images_that_are_not_annotated_three_are_named(names, told):
-    counts = "n_images n_with_people n_without_people n_not_mentioned n_people n_cut n_keypoints n_outside"
-    summary = dict.fromkeys(counts.split(), 0) | {"format": "coco", "unmatched": list(names)}
+    counts = "images with_people without_people not_mentioned people cut keypoints outside passed_over"
+    summary = {f"n_{count}": 0 for count in counts.split()} | {"format": "coco", "unmatched": list(names)}
     summary |= {"conventions": {}, "score_range": [0.0, 0.0, 0.0], "score_scale": 1.0}
     assert summary_lines(summary)[-1] == f"not annotated and left out: {len(names)} images ({told})"

@@ -84,6 +84,23 @@ def test_a_file_is_named_after_its_image_in_several_ways(tmp_path, images, name)
     assert len(import_predictions("openpose", tmp_path, images).detections[785]) == 1
 
 
+@pytest.mark.parametrize(("format", "ending"), [("openpose", "_keypoints.json"), ("mmpose", ".json")])
+def test_names_with_an_underscore_first_count_and_others_are_told(tmp_path, format, ending):
+    """Cameras name pictures so that are in Adobe RGB."""
+    names = ["_DSC0001", "_MG_0003"]
+    write = write_openpose if format == "openpose" else write_mmpose
+    write(tmp_path, {f"{name}.jpg": [make_person()] for name in names})
+    assert READERS[format](tmp_path).sources == names
+    people = annotated({785: "_DSC0001.jpg"})
+    extra = tmp_path / ("b.json" if format == "openpose" else "b.JSON")
+    extra.write_text("{}")
+    summary = import_predictions(format, tmp_path, people).summary
+    assert summary["n_passed_over"] == 1 and summary["unmatched"] == ["_MG_0003"]
+    assert summary_lines(summary)[-1] == "passed over: 1 files in JSON, not named as the others"
+    extra.unlink()
+    assert "passed over" not in str(summary_lines(import_predictions(format, tmp_path, people).summary))
+
+
 def test_who_is_not_openpose_has_no_half_pixel(tmp_path, images):
     person = make_person()
     write_openpose(tmp_path, {IMAGE: [person]}, "coco18", with_hands=False)
