@@ -262,7 +262,8 @@ def export(detections: Path, kind: str, layout: str, annotations: Path | None, o
     from hicp_lib.formats.exporters import export_detections
 
     people = None if annotations is None else read_annotations(annotations)
-    n = export_detections(kind, read_detections(detections, people), out, people, layout)
+    extras: dict[int, list[dict]] = {}
+    n = export_detections(kind, read_detections(detections, people, extras), out, people, layout, extras)
     click.echo(f"{out}: {n} people")
 
 

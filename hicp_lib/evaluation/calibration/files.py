@@ -12,18 +12,17 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_json, write_bytes
+from hicp_lib.core.files import write_bytes
 from hicp_lib.core.keypoints import GROUPS
 from hicp_lib.core.tables import read_table
 from hicp_lib.evaluation.calibration.curves import Calibration, calibration_table, calibrations_of
 from hicp_lib.evaluation.calibration.keypoint_hits import keypoint_hits
 from hicp_lib.formats.annotations import Annotations
+from hicp_lib.formats.detection_files import CALIBRATED, RAW_SCORES
 from hicp_lib.formats.detections import read_detections, write_detections
 
-RAW_SCORES = "raw_keypoint_scores"
 _ROUNDING = 1e-12  # by which a rate may decrease
 _COLUMNS = ["detector", "group", "score", "rate"]
-_KNOWN_KEYS = {"image_id", "category_id", "keypoints", "score"}
 
 
 def fit_calibrations(
@@ -140,14 +139,17 @@ def apply_calibrations(
     Raises
     ------
     InputError
-        As `hicp_lib.formats.detections.read_detections`.
+        As `hicp_lib.formats.detections.read_detections`; if it is calibrated already.
     """
-    found = read_detections(detections_path)
-    extras: dict[int, list[dict]] = {image_id: [] for image_id in found}
-    for row in read_json(detections_path):
-        of_image = extras[row["image_id"]]
-        raw = {RAW_SCORES: found[row["image_id"]].scores[len(of_image)].tolist()}
-        of_image.append(raw | {key: value for key, value in row.items() if key not in _KNOWN_KEYS})
+    extras: dict[int, list[dict]] = {}
+    found = read_detections(detections_path, extras=extras)
+    for image_id, people in extras.items():
+        if any(extra.get(CALIBRATED) for extra in people):
+            problem = f"the keypoint scores of image {image_id} are calibrated already"
+            raise InputError(f"{detections_path}: {problem}; give the detector's own results")
+        raw = found[image_id].scores.tolist()
+        pairs = zip(raw, people, strict=True)
+        extras[image_id] = [{RAW_SCORES: scores} | extra | {CALIBRATED: True} for scores, extra in pairs]
     for group, calibration in calibrations.items():
         found = {image_id: calibration.apply(people, group) for image_id, people in found.items()}
     write_detections(out, found, extras)

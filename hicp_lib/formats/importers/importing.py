@@ -18,6 +18,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.images import inside
 from hicp_lib.formats.annotations import Annotations, rows_by_image
+from hicp_lib.formats.detection_files import RAW_SCORES
 from hicp_lib.formats.importers.matching import ImageMatcher
 from hicp_lib.formats.importers.mmpose import read_mmpose
 from hicp_lib.formats.importers.openpose import read_openpose, refuse_other_size
@@ -136,7 +137,7 @@ def _by_image(
         if (image := matched[source]) is not None:
             points = people.keypoints_px[rows]
             detections[image] = Detections(points, scores[rows], people.person_scores[rows])
-            extras[image] = [people.extras[i] | {"raw_keypoint_scores": raw[i]} for i in rows.tolist()]
+            extras[image] = [people.extras[i] | {RAW_SCORES: raw[i]} for i in rows.tolist()]
     return detections, extras
 
 

@@ -8,8 +8,10 @@ import pytest
 
 from hicp_lib.cli import main as cli
 from hicp_lib.core.errors import InputError
+from hicp_lib.evaluation.calibration.curves import Calibration
 from hicp_lib.evaluation.calibration.files import apply_calibrations, read_calibrations
-from hicp_lib.formats.detections import read_detections
+from hicp_lib.formats.detection_files import read_rows
+from hicp_lib.formats.detections import read_detections, write_detections
 
 N = 40
 
@@ -53,10 +55,31 @@ def test_scores_become_hit_rates_and_raw_ones_stay_beside(files, capsys):
     row = json.loads((files / "calibrated.json").read_text())[0]
     assert row["raw_keypoint_scores"][:6] == [0.9, 0.6, 0.9, 0.9, 0.9, 0] and row["box"] == [1, 2, 3, 4]
     # Of what an importer wrote, the tool's own scores stay.
-    imported = [{**row, "raw_keypoint_scores": [7.0] * 136}]
+    imported = [{**row, "raw_keypoint_scores": [7.0] * 136, "calibrated": False}]
     (files / "imported.json").write_text(json.dumps(imported))
     apply_calibrations(files / "imported.json", read_calibrations(files / "cal.csv"), files / "out.json")
     assert json.loads((files / "out.json").read_text())[0]["raw_keypoint_scores"] == [7.0] * 136
+
+
+@pytest.mark.parametrize("suffix", [".json", ".csv", ".parquet"])
+def test_calibrated_results_keep_names_and_raw_scores_in_every_format_and_are_not_calibrated_again(
+    files, suffix
+):
+    rows = json.loads((files / "found.json").read_text())
+    named = [
+        row | {"file_name": f"{N + 1 - row['image_id']}.jpg", "time_s": row["image_id"] / 8} for row in rows
+    ]
+    (files / "named.json").write_text(json.dumps(named))
+    write_detections(files / f"named{suffix}", read_detections(files / "named.json", extras=(of := {})), of)
+    curve = {"body": Calibration(np.array([0.0, 1.0]), np.array([0.0, 0.5]))}
+    out = files / f"out{suffix}"
+    assert apply_calibrations(files / f"named{suffix}", curve, out) == N
+    for row, before in zip(read_rows(out), named, strict=True):
+        assert (row["file_name"], row["time_s"]) == (before["file_name"], before["time_s"])
+        raw, scores = np.array(row["raw_keypoint_scores"]), row["keypoints"][2::3]
+        assert raw[:6].tolist() == [0.9, 0.6, 0.9, 0.9, 0.9, 0] and np.allclose(scores, raw / 2)
+    with pytest.raises(InputError, match=f"out{suffix}: .* image 1 are calibrated already"):
+        apply_calibrations(out, curve, files / "twice.json")
 
 
 def test_the_reports_table_is_read_by_detector(files):
