@@ -25,7 +25,7 @@ from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import write_json
 from hicp_lib.core.keypoints import LIMBS, NAMES, TO_HALPE
 from hicp_lib.formats.annotations import PERSON, Annotations, image_rows
-from hicp_lib.formats.detection_files import FACTS, result_rows
+from hicp_lib.formats.detection_files import FACTS, refuse_other_suffix, result_rows
 
 FORMATS = ("coco", "fiftyone")
 LAYOUTS = ("halpe136", "halpe26", "coco17", "wholebody133")
@@ -62,8 +62,9 @@ def export_detections(
     Raises
     ------
     InputError
-        For an unknown format or layout, and images without name and size.
+        For an unknown format or layout, images without name and size, and a file not named `.json`.
     """
+    refuse_other_suffix(out, [".json"])
     refuse_unknown("format", format, FORMATS)
     refuse_unknown("layout", layout, LAYOUTS)
     people = list(_people(detections, TO_HALPE[layout], (format == "coco" and extras) or {}))

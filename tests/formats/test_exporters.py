@@ -111,6 +111,8 @@ def test_what_cannot_be_exported(tmp_path, images, found):
         export_detections("fiftyone", found, out)
     with pytest.raises(InputError, match="image 8: not among"):
         export_detections("fiftyone", {8: found[9]}, out, images)
+    with pytest.raises(InputError, match="d.csv: ends in '.csv'; expected .json"):
+        export_detections("coco", found, tmp_path / "d.csv")
     assert not out.exists()
 
 
