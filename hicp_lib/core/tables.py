@@ -92,7 +92,7 @@ def _parquet(file: BinaryIO, n_rows: int | None) -> tuple[list[str], Iterable[pd
     if n_cells > raised(_CELLS + _CELLS_PER_BYTE * n_bytes):
         raise ValueError(f"{n_cells} cells in {n_bytes} bytes")
     parts = table.iter_batches(n_rows) if n_rows else map(ParquetFile.read, [table])
-    return table.schema_arrow.names, (part.to_pandas() for part in parts)
+    return table.schema_arrow.names, (part.to_pandas(ignore_metadata=True) for part in parts)
 
 
 def _csv(file: BinaryIO, n_rows: int | None, options: dict) -> tuple[list[str], Iterable[pd.DataFrame]]:
@@ -103,4 +103,11 @@ def _csv(file: BinaryIO, n_rows: int | None, options: dict) -> tuple[list[str], 
     if len(found) > _MAX_COLUMNS:
         raise ValueError(f"{len(found)} columns")
     parts = pd.read_csv(file, skipinitialspace=True, chunksize=n_rows, **_EXACT, **options)
-    return found, parts if n_rows else [parts]
+    return found, map(_as_titled, parts if n_rows else [parts])
+
+
+def _as_titled(part: pd.DataFrame) -> pd.DataFrame:
+    """The table itself; pandas takes a first column without a title for an index, and moves all titles."""
+    if len(part) and not isinstance(part.index, pd.RangeIndex):
+        raise ValueError("rows have more fields than the header")
+    return part

@@ -14,6 +14,7 @@ CSV = {
     "a column missing": ("a,c\n1,2\n", "no column 'b'"),
     "very many columns": ("a,b" + ",x" * 10**6 + "\n1,2" + ",1" * 10**6 + "\n", "1000002 columns"),
     "rows that differ": ("a,b\n1,2\n1,2,3\n", "cannot be read as a table"),
+    "a comma behind each row": ("a,b\n1,2,\n3,4,\n", "rows have more fields than the header"),
     "nothing": ("", "cannot be read as a table"),
     "no text": (b"\xff\xfe\x00a,b".decode("latin-1"), "cannot be read as a table|no column"),
 }
@@ -50,6 +51,11 @@ def test_parquet_is_read_where_its_columns_are_there_once(tmp_path):
     path.write_bytes(path.read_bytes()[:-20])
     with pytest.raises(InputError, match="t.parquet: cannot be read as a table"):
         read_table(path, ["a", "b"])
+
+
+def test_columns_that_pandas_has_as_its_index_are_columns(tmp_path):
+    pd.DataFrame({"a": [3, 1], "b": [4, 2]}).set_index("a").to_parquet(tmp_path / "t.parquet")
+    assert read_table(tmp_path / "t.parquet", ["a", "b"])["a"].tolist() == [3, 1]
 
 
 def test_a_small_file_that_stands_for_very_many_cells_is_not_unpacked(tmp_path, monkeypatch):
