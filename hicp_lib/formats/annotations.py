@@ -256,6 +256,7 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> 
         raise rows.error(i, "bbox has a negative width or height; expected [x, y, width, height] in pixels")
     flags = rows.column("iscrowd", lambda f: isinstance(f, int | float) and f in (0, 1), "0 or 1", default=0)
     is_crowd = np.array(flags, dtype=bool)
+    rows.column("source_image_id", lambda of: type(of) in (int, str), "a whole number or a text", default=0)
     areas, area_note = _areas(rows, boxes, is_crowd)
     triples, found = rows.keypoints(layouts)
     sizes = np.array([(images[i].width_px, images[i].height_px) for i in image_ids.tolist()]).reshape(-1, 2)
@@ -270,6 +271,9 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> 
     shown = boxes, labelled, sizes
     is_unnamed = layouts is CONVENTIONS and "coco17" in found
     notes = {"names": "17 keypoints without names are taken for COCO's" * is_unnamed, "area": area_note}
+    n_parts = sum(any(row.get(key) for key in PART_KEYS) for row in rows.rows) * (133 not in layouts)
+    left_out = f"{', '.join(PART_KEYS)} of {n_parts} people left out: the names are not COCO's 17"
+    notes |= {"parts": left_out * bool(n_parts)}
     notes |= {"boxes": corners_note(rows.path, *shown), "pixels": doubts(*shown)}
     return Annotations(
         images, ids, image_ids, boxes, areas, is_crowd, keypoints, visibility, rows.extras(_KNOWN_KEYS),

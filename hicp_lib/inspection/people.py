@@ -93,7 +93,7 @@ def describe_annotations(path: Path) -> Facts:
 
 
 def _layout(rows: list[dict], names: Sequence[str]) -> str:
-    n = {133 if all(key in row for key in PART_KEYS) else len(row.get("keypoints", ())) // 3 for row in rows}
+    n = {133 if any(map(row.get, PART_KEYS)) else len(row.get("keypoints", ())) // 3 for row in rows}
     if not names:
         return f"{', '.join(map(str, sorted(n)))} keypoints by their number: the file has no names"
     indices = layouts_of("", names)[0][len(names)]

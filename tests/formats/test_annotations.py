@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.keypoints import INDEX, TO_HALPE
+from hicp_lib.core.keypoints import INDEX, NAMES, TO_HALPE
 from hicp_lib.datasets.subsets import SUBSETS, crop_annotations, plan
 from hicp_lib.evaluation.ap.evaluate import evaluate
 from hicp_lib.formats.annotations import Annotations, read_annotations, write_annotations
@@ -99,6 +99,19 @@ def test_wholebody_files_spread_over_five_keys(write):
     joined = read_annotations(write(file(person(1, n=133))))
     read = read_annotations(write(file(spread)))
     assert np.array_equal(read.keypoints_px, joined.keypoints_px, equal_nan=True)
+    # Keys that are absent, null or empty are of parts nobody labelled.
+    for key, rest in (("foot_kpts", {"face_kpts": None, "lefthand_kpts": []}), ("face_kpts", {})):
+        partial = {k: of for k, of in (spread | rest).items() if k != key}
+        some = read_annotations(write(file(partial, person(2, n=17))))
+        gone = [k for k in cuts if not partial.get(k)]
+        zeros = [0 if any(cuts[k][0] <= i < cuts[k][1] for k in gone) else x for i, x in enumerate(whole)]
+        same = read_annotations(write(file(person(1, keypoints=zeros), person(2, n=17))))
+        assert np.array_equal(some.keypoints_px, same.keypoints_px, equal_nan=True)
+        assert (some.visibility[0, INDEX["right_hand_root"]] > 0) and (some.visibility[1] > 0).sum() == 17
+    # Where the body's keypoints are not COCO's, it is told that the others are not read.
+    named = file(person(1, n=16, lefthand_kpts=whole[:63]), person(2, n=16))
+    named["categories"][0]["keypoints"] = [*NAMES[:15], "neck"]
+    assert "of 1 people left out" in read_annotations(write(named)).notes["parts"]
     # The left small toe is WholeBody's 18, Halpe's 22.
     assert read.keypoints_px[0, INDEX["left_small_toe"]].tolist() == [118.0, 96.0]
 
@@ -187,6 +200,10 @@ MALFORMED_ANNOTATIONS = {
     "true for 1": (file(person(1), changed(person(2), 2, True)), r"\(id 2\): .*\(nose v\) is true"),
     "huge": (file(changed(person(1), 0, 10**400)), r"\(nose x\) is too large a number"),
     "NaN elsewhere": (file(person(1, note=[math.nan])), "a further key holds NaN"),
+    "source a list": (file(person(1, source_image_id=[1])), "source_image_id is a list of 1; expected"),
+    "source null": (file(person(1, source_image_id=None)), "source_image_id is null; expected"),
+    "too short a hand": (file(person(1, n=17, lefthand_kpts=[1, 2, 2])), "lefthand_kpts is a list of 3"),
+    "no list of a face": (file(person(1, n=17, face_kpts=7)), "face_kpts is 7; expected a list of 204"),
     "image id twice": (file() | {"images": 2 * file()["images"][:1]}, "id is used before, by images"),
     "image no size": (file() | {"images": [{"id": 1, "file_name": "a"}]}, r"\(id 1\): has no 'width'"),
 }  # fmt: skip
