@@ -292,12 +292,14 @@ def evaluate(
     if out is not None:
         refuse_other_suffix(out)
     people = read_annotations(annotations, keypoint_map)
-    parts = detections_in_parts(detections, people)
+    doubts: dict[str, str] = {}
+    parts = detections_in_parts(detections, people, doubts)
     found = list(islice(parts, 1))
     tell_notes(annotations, people.notes, area)
     options = {"area": area} | ({} if sigmas is None else {"sigmas": sigmas})
     groups = GROUPS if group is None else [group]
     judged = judgement.judge(people, chain(found, parts), groups, by_image, seed, **options)
+    tell_notes(detections, doubts)
     if out is not None:
         judgement.write_judgement(out, judged)
     if as_json:

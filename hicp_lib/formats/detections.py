@@ -20,7 +20,7 @@ from hicp_lib.formats.detection_files import KNOWN_KEYS, open_detections, rows_i
 from hicp_lib.formats.importers.matching import ImageMatcher
 from hicp_lib.formats.json_validation import Rows
 from hicp_lib.formats.layouts import PERSON_CATEGORY, PersonCategory
-from hicp_lib.formats.units import count_fractions, refuse_fractions
+from hicp_lib.formats.units import count_fractions, fractions_note
 
 
 def read_detections(
@@ -63,7 +63,7 @@ def read_detections(
 
 
 def detections_in_parts(
-    path: str | Path, annotations: Annotations | None = None
+    path: str | Path, annotations: Annotations | None = None, notes: dict[str, str] | None = None
 ) -> Iterator[tuple[np.ndarray, Detections]]:
     """As `read_detections`, some people at a time in the order of the file, so that memory need not hold it.
 
@@ -73,6 +73,8 @@ def detections_in_parts(
         As of `read_detections`.
     annotations : Annotations, optional
         As of `read_detections`.
+    notes : dict of str to str, optional
+        Filled with remarks on the file, after the last part.
 
     Yields
     ------
@@ -86,10 +88,12 @@ def detections_in_parts(
     InputError
         As `read_detections`, also after the last part.
     """
-    yield from ((image_ids, people) for image_ids, people, _ in _in_parts(Path(path), annotations))
+    yield from ((image_ids, people) for image_ids, people, _ in _in_parts(Path(path), annotations, notes))
 
 
-def _in_parts(path: Path, annotations: Annotations | None) -> Iterator[tuple[np.ndarray, Detections, Rows]]:
+def _in_parts(
+    path: Path, annotations: Annotations | None, notes: dict[str, str] | None = None
+) -> Iterator[tuple[np.ndarray, Detections, Rows]]:
     """As `detections_in_parts`, with the objects, which have lost their keypoints."""
     category = PersonCategory() if annotations is None else annotations.category
     allowed = {category.id, PERSON_CATEGORY} - category.others
@@ -104,9 +108,10 @@ def _in_parts(path: Path, annotations: Annotations | None) -> Iterator[tuple[np.
         triples, _ = rows.keypoints()
         keypoints = triples[..., :2]
         np.copyto(keypoints, np.nan, where=~triples.any(axis=-1, keepdims=True))
-        fractions.append(count_fractions(keypoints))
+        fractions.append(count_fractions(keypoints, rows.first))
         yield image_ids, Detections(keypoints, triples[..., 2], person_scores), rows
-    refuse_fractions(path, fractions)
+    if (note := fractions_note(path, fractions)) and notes is not None:
+        notes["fractions"] = note
 
 
 def _whole_images(parts: Iterable[Any]) -> Iterator[Any]:

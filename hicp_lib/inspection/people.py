@@ -14,7 +14,7 @@ from hicp_lib.formats.importers.people import People
 from hicp_lib.formats.importers.scores import score_scale
 from hicp_lib.formats.json_validation import PART_KEYS
 from hicp_lib.formats.layouts import layouts_of
-from hicp_lib.formats.units import count_fractions, refuse_fractions
+from hicp_lib.formats.units import count_fractions, fractions_note
 from hicp_lib.inspection.facts import Facts, about_people, about_times, tables
 
 
@@ -35,7 +35,7 @@ def describe_predictions(path: Path, tool: str, origin: str = "") -> Facts:
     Facts
     """
     people = READERS[tool](path)
-    refuse_fractions(path, [count_fractions(people.keypoints_px)])
+    note = fractions_note(path, [count_fractions(people.keypoints_px)])
     layouts = ", ".join(f"{name} {n}" for name, n in people.conventions.items())
     scores, needs = _scores(tool, people)
     says = {
@@ -47,7 +47,7 @@ def describe_predictions(path: Path, tool: str, origin: str = "") -> Facts:
     times_s = sorted({extra["time_s"] for extra in people.extras if "time_s" in extra})
     if times_s:
         says["times"] = about_times(np.array(times_s), "of the video; frames with people")
-    return Facts(says, needs=needs)
+    return Facts(says, [note] * bool(note), needs)
 
 
 def _scores(tool: str, people: People) -> tuple[str, dict[str, str]]:

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
+from hicp_lib.cli import main as cli
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX, NAMES, TO_HALPE
@@ -16,6 +17,7 @@ from hicp_lib.datasets.subsets import SUBSETS, crop_annotations, plan
 from hicp_lib.evaluation.ap.evaluate import evaluate
 from hicp_lib.formats.annotations import Annotations, read_annotations, write_annotations
 from hicp_lib.formats.detections import read_detections, write_detections
+from hicp_lib.formats.importers.importing import import_predictions, summary_lines
 
 
 def keypoints(n: int, x: float = 100.0, v: float = 2) -> list[float]:
@@ -138,6 +140,25 @@ def test_detections_are_read_in_the_order_of_the_file(write):
     only_one = read_detections(write(lines[:1]), truth)
     assert list(only_one) == [7, 9] and len(only_one[7]) == 0 and len(only_one[9]) == 1
     assert list(read_detections(write(lines[:1]))) == [9]
+
+
+def test_people_in_fractions_among_others_are_told(tmp_path, capsys):
+    truth, found = [person(i, area=41_000) for i in range(5)], [result() for _ in range(5)]
+    truth[3] |= {"bbox": [0.1, 0.1, 0.5, 0.6], "keypoints": [0.5, 0.6, 2] * 136}
+    found[1] |= {"keypoints": [0.5, 0.6, 0.9] * 136}
+    a, d = tmp_path / "a.json", tmp_path / "d.json"
+    a.write_text(json.dumps(file(*truth)))
+    d.write_text(json.dumps(found))
+    some = "of 1 of 5 people, first of entry {} (from 0), lie in [-1, 1]"
+    given = ["--annotations", str(a), "--detections", str(d)]
+    assert cli.run(["evaluate", *given, "--group", "body"]) == 0
+    told = capsys.readouterr().err
+    assert f"{d}: keypoints {some.format(1)}; they are read as pixels" in told
+    assert f"{a}: keypoints {some.format(3)}" in told and f"; boxes {some.format(3)}" in told
+    imported = import_predictions("coco", d, read_annotations(a))
+    assert f"keypoints {some.format(1)}" in summary_lines(imported.summary)[-1]
+    assert cli.run(["inspect", str(d)]) == 0
+    assert "note: keypoints of 1 of 5 people" in capsys.readouterr().out
 
 
 def test_an_empty_list_of_detections_is_nobody_found(write):

@@ -25,7 +25,7 @@ from hicp_lib.formats.importers.openpose import read_openpose, refuse_other_size
 from hicp_lib.formats.importers.people import People
 from hicp_lib.formats.importers.results import ALPHAPOSE, COCO, DETECTRON2, read_results
 from hicp_lib.formats.importers.scores import score_scale
-from hicp_lib.formats.units import count_fractions, refuse_fractions
+from hicp_lib.formats.units import count_fractions, fractions_note
 
 _LEAST_IMAGES = 5  # needed to decide whether coordinates are of another size
 _OFF, _ALIKE = np.log(1.25), 0.1  # logarithms of ratios: another size, and equal in both directions
@@ -57,7 +57,7 @@ class Imported:
         out; `n_people` imported; `conventions`, people per keypoint convention, unmatched ones included;
         `score_range`, lowest, median and highest keypoint score as the tool wrote them; `score_scale`, what
         they were divided by, and `n_cut`, how many were then clipped to 1; `n_keypoints` given, and
-        `n_outside` of their image.
+        `n_outside` of their image; `notes`, what is doubtful.
     """
 
     detections: dict[int, Detections]
@@ -95,7 +95,7 @@ def import_predictions(
     if scale is not None and not 0 < scale < np.inf:
         raise InputError(f"--score-scale is {scale:g}; expected a positive number")
     people = READERS[format](Path(path))
-    refuse_fractions(people.path, [count_fractions(people.keypoints_px)])
+    note = fractions_note(people.path, [count_fractions(people.keypoints_px)])
     matched = ImageMatcher(people.path, people.named_by, annotations.images).match(people.sources)
     scale = score_scale(format, people) if scale is None else scale
     rows = np.flatnonzero([matched[s] is not None for s in people.source_of])
@@ -106,7 +106,8 @@ def import_predictions(
     image_ids = np.array([matched[s] for s in people.source_of[rows]], dtype=np.int64)
     _refuse_other_scale(people.path, people.keypoints_px[rows], image_ids, annotations)
     detections, extras = _by_image(people, matched, annotations, scale)
-    return Imported(detections, extras, _summary(format, people, matched, annotations, rows, sizes, scale))
+    summary = _summary(format, people, matched, annotations, rows, sizes, scale)
+    return Imported(detections, extras, summary | {"notes": [note] * bool(note)})
 
 
 def _refuse_other_scale(
@@ -181,4 +182,5 @@ def summary_lines(summary: dict[str, Any]) -> list[str]:
         f"keypoint scores {low:.3g} to {high:.3g}, median {middle:.3g}: {scaled}, {n_cut} cut to 1",
         "keypoints outside their image: {n_outside} of {n_keypoints}".format(**summary),
         f"not annotated and left out: {len(unmatched)} images{named if unmatched else ''}",
+        *summary["notes"],
     ]

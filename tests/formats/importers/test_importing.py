@@ -266,5 +266,5 @@ def test_mmpose_without_boxes_ranks_by_keypoints(tmp_path, images):
 def test_of_images_that_are_not_annotated_three_are_named(names, told):
     counts = "n_images n_with_people n_without_people n_not_mentioned n_people n_cut n_keypoints n_outside"
     summary = dict.fromkeys(counts.split(), 0) | {"format": "coco", "unmatched": list(names)}
-    summary |= {"conventions": {}, "score_range": [0.0, 0.0, 0.0], "score_scale": 1.0}
+    summary |= {"conventions": {}, "score_range": [0.0, 0.0, 0.0], "score_scale": 1.0, "notes": []}
     assert summary_lines(summary)[-1] == f"not annotated and left out: {len(names)} images ({told})"
