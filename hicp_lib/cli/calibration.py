@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from hicp_lib.cli.options import PATH
+from hicp_lib.cli.options import PATH, tell_notes
 
 
 @click.group()
@@ -25,8 +25,12 @@ def calibration_fit(annotations: Path, detections: Path, detector: str, out: Pat
 
     people = read_annotations(annotations)
     table, counts = fit_calibrations(people, read_detections(detections, people), detector)
+    tell_notes(annotations, people.notes)
     write_calibrations(out, table)
-    click.echo(f"{out}: " + ", ".join(f"{group} fitted to {n} keypoints" for group, n in counts.items()))
+    told = (
+        f"fitted to {n} keypoints" if n else "not fitted: the annotations label none" for n in counts.values()
+    )
+    click.echo(f"{out}: " + ", ".join(f"{group} {of}" for group, of in zip(counts, told, strict=True)))
 
 
 @calibration.command("apply")

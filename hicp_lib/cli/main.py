@@ -32,6 +32,7 @@ from hicp_lib.cli.options import (
     people_option,
     say,
     tell_assumed,
+    tell_notes,
     text_table,
     worker_options,
 )
@@ -123,13 +124,6 @@ def _run(arguments: list[str]) -> int:
         return _fail("the memory is not enough; process less at once, or use fewer --workers", 2)
 
 
-def _tell_notes(path: Path, notes: dict[str, str], area: str = "segment") -> None:
-    """Print a file's notes; those on areas only if they are used."""
-    for about, note in notes.items():
-        if about != "area" or area == "segment":
-            say(f"{path}: {note}")
-
-
 def _fail(message: object, code: int) -> int:
     say(f"hicp: {message}"[:_MOST_SHOWN])
     return code
@@ -181,7 +175,7 @@ def dataset_create(out: Path, annotations: Path, images: Path, **options) -> Non
     from hicp_lib.datasets.subsets import create_hicp, notes
 
     counts = create_hicp(annotations, images, out, progress=sys.stderr.isatty(), **options)
-    _tell_notes(annotations, counts.get("notes", {}))
+    tell_notes(annotations, counts.get("notes", {}))
     click.echo(json.dumps(counts, indent=2))
     for note in notes(counts):
         say(note)
@@ -243,7 +237,9 @@ def import_(
     from hicp_lib.formats.detections import write_detections
     from hicp_lib.formats.importers.importing import import_predictions, summary_lines
 
-    imported = import_predictions(kind, predictions, read_annotations(annotations, keypoint_map), score_scale)
+    people = read_annotations(annotations, keypoint_map)
+    imported = import_predictions(kind, predictions, people, score_scale)
+    tell_notes(annotations, people.notes, "")
     write_detections(out, imported.detections, imported.extras)
     summary = imported.summary
     click.echo(json.dumps(summary, indent=2) if as_json else "\n".join(summary_lines(summary)))
@@ -262,7 +258,8 @@ def export(detections: Path, kind: str, layout: str, annotations: Path | None, o
     from hicp_lib.formats.exporters import export_detections
 
     people = None if annotations is None else read_annotations(annotations)
-    n = export_detections(kind, read_detections(detections, people), out, people, layout)
+    extras: dict[int, list[dict]] = {}
+    n = export_detections(kind, read_detections(detections, people, extras), out, people, layout, extras)
     click.echo(f"{out}: {n} people")
 
 
@@ -295,12 +292,14 @@ def evaluate(
     if out is not None:
         refuse_other_suffix(out)
     people = read_annotations(annotations, keypoint_map)
-    parts = detections_in_parts(detections, people)
+    doubts: dict[str, str] = {}
+    parts = detections_in_parts(detections, people, doubts)
     found = list(islice(parts, 1))
-    _tell_notes(annotations, people.notes, area)
+    tell_notes(annotations, people.notes, area)
     options = {"area": area} | ({} if sigmas is None else {"sigmas": sigmas})
     groups = GROUPS if group is None else [group]
     judged = judgement.judge(people, chain(found, parts), groups, by_image, seed, **options)
+    tell_notes(detections, doubts)
     if out is not None:
         judgement.write_judgement(out, judged)
     if as_json:

@@ -2,7 +2,7 @@
 
 import errno
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -115,6 +115,22 @@ def text_table(rows: Sequence[Sequence[str]]) -> str:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     padded = ([f"{cell:<{n}}" for cell, n in zip(row, widths, strict=True)] for row in rows)
     return "\n".join("  ".join(cells).rstrip() for cells in padded)
+
+
+def tell_notes(path: Path, notes: Mapping[str, str], area: str = "segment") -> None:
+    """Print a file's notes; those on areas only if these are used.
+
+    Parameters
+    ----------
+    path : Path
+    notes : mapping of str to str
+        By topic.
+    area : str, optional
+        What is taken for areas.
+    """
+    for about, note in notes.items():
+        if about != "area" or area == "segment":
+            say(f"{path}: {note}")
 
 
 def say(message: object, err: bool = True) -> None:

@@ -1,7 +1,9 @@
 """External tables: CSV and Parquet, with columns selected by name."""
 
 import os
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -92,7 +94,7 @@ def _parquet(file: BinaryIO, n_rows: int | None) -> tuple[list[str], Iterable[pd
     if n_cells > raised(_CELLS + _CELLS_PER_BYTE * n_bytes):
         raise ValueError(f"{n_cells} cells in {n_bytes} bytes")
     parts = table.iter_batches(n_rows) if n_rows else map(ParquetFile.read, [table])
-    return table.schema_arrow.names, (part.to_pandas() for part in parts)
+    return table.schema_arrow.names, (part.to_pandas(ignore_metadata=True) for part in parts)
 
 
 def _csv(file: BinaryIO, n_rows: int | None, options: dict) -> tuple[list[str], Iterable[pd.DataFrame]]:
@@ -102,5 +104,15 @@ def _csv(file: BinaryIO, n_rows: int | None, options: dict) -> tuple[list[str], 
     found = [name.strip(' "\r\n') for name in first.split(",")]
     if len(found) > _MAX_COLUMNS:
         raise ValueError(f"{len(found)} columns")
-    parts = pd.read_csv(file, skipinitialspace=True, chunksize=n_rows, **_EXACT, **options)
-    return found, parts if n_rows else [parts]
+    # With an index, pandas moves all titles by one column where rows have more fields than titles.
+    reader = pd.read_csv(file, skipinitialspace=True, index_col=False, iterator=True, **_EXACT, **options)
+    return found, _parts(reader, n_rows)
+
+
+def _parts(reader: Any, n_rows: int | None) -> Iterator[pd.DataFrame]:
+    part = None
+    with suppress(StopIteration):
+        while part is None or n_rows:
+            with warnings.catch_warnings(action="error", category=pd.errors.ParserWarning):  # untitled fields
+                part = reader.read(n_rows)
+            yield part

@@ -34,7 +34,7 @@ from hicp_lib.formats.importers.matching import ImageMatcher
 from hicp_lib.formats.json_validation import CONVENTIONS, PART_KEYS, Layouts, Rows
 from hicp_lib.formats.layouts import PERSON_CATEGORY, PersonCategory, layouts_of, person_category
 from hicp_lib.formats.number_lists import read_people
-from hicp_lib.formats.units import corners_note, count_fractions, doubts, refuse_fractions
+from hicp_lib.formats.units import corners_note, count_fractions, doubts, fractions_note
 
 SEGMENT_OF_BOX = 0.53  # typical ratio of the segment's area to the box's, as other tools use it
 _LEAST_AREA, _MOST_AREA = 0.01, 2.0  # plausible areas of a person, relative to the box
@@ -288,6 +288,7 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> 
         raise rows.error(i, "bbox has a negative width or height; expected [x, y, width, height] in pixels")
     flags = rows.column("iscrowd", lambda f: isinstance(f, int | float) and f in (0, 1), "0 or 1", default=0)
     is_crowd = np.array(flags, dtype=bool)
+    rows.column("source_image_id", lambda of: type(of) in (int, str), "a whole number or a text", default=0)
     areas, area_note = _areas(rows, boxes, is_crowd)
     triples, found = rows.keypoints(layouts)
     sizes = np.array([(images[i].width_px, images[i].height_px) for i in image_ids.tolist()]).reshape(-1, 2)
@@ -297,11 +298,16 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> 
     keypoints = np.where(known[..., None], triples[..., :2], np.nan)
     del triples  # large data are held in memory once
     labelled = np.where((visibility > 0)[..., None], keypoints, np.nan) if outside.any() else keypoints
-    refuse_fractions(rows.path, [count_fractions(labelled)])
-    refuse_fractions(rows.path, [count_fractions(boxes.reshape(-1, 2, 2))], "boxes")
+    fractions = [
+        fractions_note(rows.path, [count_fractions(points)], what)
+        for points, what in ((labelled, "keypoints"), (boxes.reshape(-1, 2, 2), "boxes"))
+    ]
     shown = boxes, labelled, sizes
     is_unnamed = layouts is CONVENTIONS and "coco17" in found
     notes = {"names": "17 keypoints without names are taken for COCO's" * is_unnamed, "area": area_note}
+    n_parts = sum(any(row.get(key) for key in PART_KEYS) for row in rows.rows) * (133 not in layouts)
+    left_out = f"{', '.join(PART_KEYS)} of {n_parts} people left out: the names are not COCO's 17"
+    notes |= {"parts": left_out * bool(n_parts), "fractions": "; ".join(filter(None, fractions))}
     notes |= {"boxes": corners_note(rows.path, *shown), "pixels": doubts(*shown)}
     return Annotations(
         images, ids, image_ids, boxes, areas, is_crowd, keypoints, visibility, rows.extras(_KNOWN_KEYS),

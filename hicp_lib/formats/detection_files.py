@@ -3,7 +3,8 @@
 - `.json`: COCO keypoint results, a list with an object for each person, 136 keypoints in Halpe's order. Next
   to `image_id` stands what is known of the image (`file_name`; for a video, `frame` and `time_s`).
 - `.csv`, `.parquet`: one row per image x person x keypoint given; columns `image_id`, what is known of the
-  image, `person` (from 0), `person_score`, `keypoint` (Halpe's name), `u_px`, `v_px`, `score`.
+  image, `person` (from 0), `person_score`, `keypoint` (Halpe's name), `u_px`, `v_px`, `score`, and
+  `raw_score`, the original one where `score` was converted. Further keys of people are not in tables.
 
 The bytes depend on the detections and their order only.
 """
@@ -25,11 +26,16 @@ from hicp_lib.core.extras import require
 from hicp_lib.core.files import atomic_path, remove_left
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
 from hicp_lib.core.tables import read_table_in_parts
+from hicp_lib.formats.json_validation import PART_KEYS
 from hicp_lib.formats.layouts import PERSON_CATEGORY
 from hicp_lib.formats.number_lists import read_people, read_people_in_parts
 
 SUFFIXES = (".json", ".csv", ".parquet")
 _TABLES = SUFFIXES[1:]
+RAW_SCORES = "raw_keypoint_scores"  # a list in JSON, the column `raw_score` in tables
+KNOWN_KEYS = {"image_id", "category_id", "keypoints", "score", *PART_KEYS}
+CALIBRATED = "calibrated"  # whether keypoint scores are
+FACTS = ("file_name", "frame", "time_s", CALIBRATED)  # in tables, too, if the first person has them
 _KEYS = ["image_id", "person"]
 _BUFFER_BYTES = 2**20
 _PEOPLE_AT_ONCE = 1000  # per batch of a table, a row group of Parquet
@@ -81,10 +87,11 @@ def open_detections(path: str | Path) -> Iterator[_Append]:
     refuse_other_suffix(path)
     remove_left(Path(os.path.realpath(path)).parent)
     is_json = Path(path).suffix == ".json"
-    with atomic_path(path) as temporary, json_list(temporary) if is_json else _table(temporary) as append:
-        yield lambda image_id, facts, found, extras=None: append(
-            *result_rows(image_id, facts, found, extras if is_json else None)
-        )
+    with (
+        atomic_path(path) as temporary,
+        json_list(temporary) if is_json else _table(path, temporary) as append,
+    ):
+        yield lambda image_id, facts, found, extras=None: append(*result_rows(image_id, facts, found, extras))
     names_beside(path).unlink(missing_ok=True)
 
 
@@ -175,20 +182,32 @@ def result_rows(
 
 
 @contextmanager
-def _table(path: Path) -> Iterator[_Append]:
+def _table(path: str | Path, temporary: Path) -> Iterator[_Append]:
     """Write people as rows of a table, in batches."""
     waiting: list[dict] = []
     with ExitStack() as stack:
-        write = _append_csv(path) if path.suffix == ".csv" else _append_parquet(path, stack)
+        is_csv = temporary.suffix == ".csv"
+        write = _append_csv(temporary) if is_csv else _append_parquet(temporary, stack)
+        columns: list[str] = []
+
+        def flush() -> None:
+            try:
+                table = _by_keypoint(waiting)
+                columns[:] = columns or table
+                write(table[columns])
+            except (KeyError, TypeError, ValueError) as error:  # pyarrow's own are among these
+                keys = ", ".join((*FACTS, RAW_SCORES))
+                problem = f"people's {keys} are no columns of a table ({one_line(error)})"
+                raise InputError(f"{path}: {problem}; write .json, or give all people the same") from None
+            waiting.clear()
 
         def append(*people: dict) -> None:
             if len(waiting) >= _PEOPLE_AT_ONCE:
-                write(_by_keypoint(waiting))
-                waiting.clear()
+                flush()
             waiting.extend(people)
 
         yield append
-        write(_by_keypoint(waiting))
+        flush()
 
 
 def _append_csv(path: Path) -> _Append:
@@ -212,14 +231,18 @@ def _append_parquet(path: Path, stack: ExitStack) -> _Append:
 
 def _by_keypoint(people: list[dict]) -> pd.DataFrame:
     """One row per keypoint of the people of an image, from `result_rows`."""
-    triples = np.array([row.pop("keypoints") for row in people]).reshape(-1, N_KEYPOINTS, 3)
-    table = pd.DataFrame(people or {"image_id": np.zeros(0, int), "category_id": 1, "score": 0.0})
-    table.insert(table.columns.get_loc("score"), "person", table.groupby("image_id").cumcount())
+    triples = np.array([row["keypoints"] for row in people]).reshape(-1, N_KEYPOINTS, 3)
     rows, keypoints = np.nonzero(triples.any(axis=-1))
-    table = table.drop(columns="category_id").rename(columns={"score": "person_score"}).iloc[rows]
-    u_px, v_px, scores = triples[rows, keypoints].T
+    values = dict(zip(("u_px", "v_px", "score"), triples[rows, keypoints].T, strict=True))
+    if people and RAW_SCORES in people[0]:
+        raw = np.array([row[RAW_SCORES] for row in people], dtype=float)
+        values["raw_score"] = raw.reshape(len(people), N_KEYPOINTS)[rows, keypoints]
+    kept = ["image_id", *(fact for fact in FACTS if people and fact in people[0]), "score"]
+    table = pd.DataFrame([[row[key] for key in kept] for row in people], columns=kept)
+    table = table.astype({"image_id": int, "score": float})
+    table.insert(len(kept) - 1, "person", table.groupby("image_id").cumcount())
     names = pd.array(np.array(NAMES)[keypoints], dtype="string")
-    return table.assign(keypoint=names, u_px=u_px, v_px=v_px, score=scores)
+    return table.rename(columns={"score": "person_score"}).iloc[rows].assign(keypoint=names, **values)
 
 
 def read_rows(path: Path) -> Any:
@@ -266,12 +289,17 @@ def _people(path: Path, table: pd.DataFrame) -> list[dict]:
         if table.duplicated([*_KEYS, "keypoint"]).any():
             raise ValueError("a keypoint of a person twice")
         people = table.groupby(_KEYS, sort=False, dropna=False)
-        first = people[["person_score", *table.columns.intersection(["file_name"])]].first()
+        first = people[["person_score", *table.columns.intersection(FACTS)]].first()
+        raw = table["raw_score"].to_numpy(float) if "raw_score" in table else None
     except (KeyError, OSError, TypeError, ValueError) as error:  # pyarrow's and pandas' own are among these
         problem = f"{type(error).__name__}: {one_line(error)}"
         raise InputError(f"{path}: is not a table written by hicp detect ({problem})") from None
     triples = np.zeros((people.ngroups, N_KEYPOINTS, 3))
     triples[people.ngroup(), keypoints] = values
     rows = first.rename(columns={"person_score": "score"}).reset_index().to_dict("records")
+    if raw is not None:
+        raw_scores = np.zeros((people.ngroups, N_KEYPOINTS))
+        raw_scores[people.ngroup(), keypoints] = raw
+        rows = [row | {RAW_SCORES: of} for row, of in zip(rows, raw_scores.tolist(), strict=True)]
     flat = triples.reshape(len(rows), 3 * N_KEYPOINTS)
     return [row | {"keypoints": keypoints} for row, keypoints in zip(rows, flat, strict=True)]

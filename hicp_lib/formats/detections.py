@@ -16,14 +16,16 @@ import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.formats.annotations import Annotations, of_people, rows_by_image
-from hicp_lib.formats.detection_files import open_detections, rows_in_parts
+from hicp_lib.formats.detection_files import KNOWN_KEYS, open_detections, rows_in_parts
 from hicp_lib.formats.importers.matching import ImageMatcher
 from hicp_lib.formats.json_validation import Rows
 from hicp_lib.formats.layouts import PERSON_CATEGORY, PersonCategory
-from hicp_lib.formats.units import count_fractions, refuse_fractions
+from hicp_lib.formats.units import count_fractions, fractions_note
 
 
-def read_detections(path: str | Path, annotations: Annotations | None = None) -> dict[int, Detections]:
+def read_detections(
+    path: str | Path, annotations: Annotations | None = None, extras: dict[int, list[dict]] | None = None
+) -> dict[int, Detections]:
     """Read COCO keypoint results (a list of `image_id, category_id, keypoints, score`).
 
     An empty list is valid: nobody was found. If the first result has a `file_name`, all need one, and it
@@ -35,6 +37,9 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
         A JSON file.
     annotations : Annotations, optional
         Every image must be among theirs; images without a detection get an empty result.
+    extras : dict of int to list of dict, optional
+        Filled with the further keys of each person's JSON object, by image id, as `write_detections` takes
+        them; of a table, with what is known of the image, and the raw scores.
 
     Returns
     -------
@@ -47,15 +52,18 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
         For anything malformed: NaN, a wrong number of keypoints, an unknown image, ...
     """
     found = {} if annotations is None else dict.fromkeys(annotations.images, Detections.none())
-    for image_ids, people in detections_in_parts(path, annotations):
+    for image_ids, people, rows in _in_parts(Path(path), annotations):
         for image_id, chosen in rows_by_image(image_ids).items():
+            if extras is not None:
+                further = ({k: v for k, v in rows.rows[i].items() if k not in KNOWN_KEYS} for i in chosen)
+                extras.setdefault(image_id, []).extend(further)
             more = people.take(chosen)
             found[image_id] = found[image_id].concatenate(more) if len(found.get(image_id, ())) else more
     return dict(sorted(found.items())) if annotations is None else found
 
 
 def detections_in_parts(
-    path: str | Path, annotations: Annotations | None = None
+    path: str | Path, annotations: Annotations | None = None, notes: dict[str, str] | None = None
 ) -> Iterator[tuple[np.ndarray, Detections]]:
     """As `read_detections`, some people at a time in the order of the file, so that memory need not hold it.
 
@@ -65,6 +73,8 @@ def detections_in_parts(
         As of `read_detections`.
     annotations : Annotations, optional
         As of `read_detections`.
+    notes : dict of str to str, optional
+        Filled with remarks on the file, after the last part.
 
     Yields
     ------
@@ -78,7 +88,13 @@ def detections_in_parts(
     InputError
         As `read_detections`, also after the last part.
     """
-    path = Path(path)
+    yield from ((image_ids, people) for image_ids, people, _ in _in_parts(Path(path), annotations, notes))
+
+
+def _in_parts(
+    path: Path, annotations: Annotations | None, notes: dict[str, str] | None = None
+) -> Iterator[tuple[np.ndarray, Detections, Rows]]:
+    """As `detections_in_parts`, with the objects, which have lost their keypoints."""
     category = PersonCategory() if annotations is None else annotations.category
     allowed = {category.id, PERSON_CATEGORY} - category.others
     matcher = None if annotations is None else ImageMatcher(path, "id", annotations.images)
@@ -92,9 +108,10 @@ def detections_in_parts(
         triples, _ = rows.keypoints()
         keypoints = triples[..., :2]
         np.copyto(keypoints, np.nan, where=~triples.any(axis=-1, keepdims=True))
-        fractions.append(count_fractions(keypoints))
-        yield image_ids, Detections(keypoints, triples[..., 2], person_scores)
-    refuse_fractions(path, fractions)
+        fractions.append(count_fractions(keypoints, rows.first))
+        yield image_ids, Detections(keypoints, triples[..., 2], person_scores), rows
+    if (note := fractions_note(path, fractions)) and notes is not None:
+        notes["fractions"] = note
 
 
 def _whole_images(parts: Iterable[Any]) -> Iterator[Any]:
@@ -126,8 +143,9 @@ def write_detections(
     detections : mapping of int to Detections
         By image id.
     extras : mapping of int to list of dict, optional
-        By image id, further keys of each person's JSON object; readers ignore them. Not in tables.
+        By image id, further keys of each person's JSON object. Of these, tables hold only what is known of
+        images, and raw scores.
     """
     with open_detections(path) as write:
         for image_id, found in detections.items():
-            write(int(image_id), {}, found, extras and extras[image_id])
+            write(int(image_id), {}, found, extras and extras.get(image_id))

@@ -11,7 +11,8 @@
   annotations has names and sizes of the images in it. A keypoint's flag is 2 when it is given; per
   person, `confidence` are the keypoints' scores and `score` is the person's.
 
-Keypoints that are not given are 0, 0, 0 in both.
+Keypoints that are not given are 0, 0, 0 in both. Results keep what was known of their image (`file_name`; of
+a video, `frame` and `time_s`).
 """
 
 from collections.abc import Iterator, Mapping
@@ -24,7 +25,7 @@ from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import write_json
 from hicp_lib.core.keypoints import LIMBS, NAMES, TO_HALPE
 from hicp_lib.formats.annotations import PERSON, Annotations, image_rows
-from hicp_lib.formats.detection_files import result_rows
+from hicp_lib.formats.detection_files import FACTS, refuse_other_suffix, result_rows
 
 FORMATS = ("coco", "fiftyone")
 LAYOUTS = ("halpe136", "halpe26", "coco17", "wholebody133")
@@ -32,7 +33,7 @@ LAYOUTS = ("halpe136", "halpe26", "coco17", "wholebody133")
 
 def export_detections(
     format: str, detections: Mapping[int, Detections], out: str | Path, annotations: Annotations | None =
-    None, layout: str = "halpe136",
+    None, layout: str = "halpe136", extras: Mapping[int, list[dict]] | None = None,
 ) -> int:  # fmt: skip
     """Write detections for another tool.
 
@@ -50,6 +51,8 @@ def export_detections(
         Of the images; "fiftyone" needs it for their names and sizes.
     layout : {"halpe136", "halpe26", "coco17", "wholebody133"}
         The keypoints written, and their order.
+    extras : mapping of int to list of dict, optional
+        As `hicp_lib.formats.detections.read_detections` fills it.
 
     Returns
     -------
@@ -59,11 +62,12 @@ def export_detections(
     Raises
     ------
     InputError
-        For an unknown format or layout, and images without name and size.
+        For an unknown format or layout, images without name and size, and a file not named `.json`.
     """
+    refuse_other_suffix(out, [".json"])
     refuse_unknown("format", format, FORMATS)
     refuse_unknown("layout", layout, LAYOUTS)
-    people = list(_people(detections, TO_HALPE[layout]))
+    people = list(_people(detections, TO_HALPE[layout], (format == "coco" and extras) or {}))
     if format == "coco":
         write_json(out, people)
     else:
@@ -73,10 +77,13 @@ def export_detections(
     return len(people)
 
 
-def _people(detections: Mapping[int, Detections], keypoints: np.ndarray) -> Iterator[dict]:
+def _people(
+    detections: Mapping[int, Detections], keypoints: np.ndarray, extras: Mapping[int, list[dict]]
+) -> Iterator[dict]:
     """One COCO keypoint result after the other."""
     for image_id, found in detections.items():
-        for row in result_rows(int(image_id), {}, found, keypoints=keypoints):
+        facts = [{key: of[key] for key in FACTS if key in of} for of in extras.get(image_id, [])]
+        for row in result_rows(int(image_id), {}, found, facts, keypoints):
             if row["keypoints"].any():
                 yield row | {"keypoints": row["keypoints"].tolist()}
 

@@ -23,8 +23,8 @@ CONVENTIONS = {17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"
 Layouts = Mapping[int, str | np.ndarray]
 Flat = list | np.ndarray
 _AT_ONCE = 2**12  # rows made into arrays at a time
-# COCO-WholeBody files spread their 133 keypoints over five keys, in this order.
-PART_KEYS = ("foot_kpts", "face_kpts", "lefthand_kpts", "righthand_kpts")
+# COCO-WholeBody files spread their 133 keypoints over five keys, in this order: of each, how many numbers.
+PART_KEYS = {"foot_kpts": 18, "face_kpts": 204, "lefthand_kpts": 63, "righthand_kpts": 63}
 _REQUIRED = object()
 _Check = Callable[[Any], bool]
 
@@ -153,8 +153,8 @@ class Rows:
         """Triples (x, y, v) in the Halpe-136 order, zeros where the file's layout has no such keypoint.
 
         Unless `layouts` is given, accepts 17 (COCO), 26 (Halpe body), 133 (COCO-WholeBody, also in its five
-        keys) and 136 (Halpe) keypoints, row by row. The rows lose their `keypoints`, so that large data are
-        held in memory once.
+        keys, four of which may be absent) and 136 (Halpe) keypoints, row by row. The rows lose their
+        `keypoints`, so that large data are held in memory once.
 
         Parameters
         ----------
@@ -222,9 +222,13 @@ class Rows:
         """Each row's keypoints in one list; its length is one of `layouts`, times 3."""
         lists = self.column("keypoints", lambda v: isinstance(v, Flat), "a list of x, y, v per keypoint")
         for i, row in enumerate(self.rows):
-            spread = len(lists[i]) == 51 and 133 in layouts
-            if spread and all(isinstance(row.get(key), list) for key in PART_KEYS):
-                lists[i] = list(chain(_listed(lists[i]), *(row[key] for key in PART_KEYS)))
+            parts = {key: of for key in PART_KEYS if (of := row.get(key)) not in (None, [])}
+            for key, of in parts.items():
+                if not (isinstance(of, list) and len(of) == PART_KEYS[key]):
+                    raise self.error(i, f"{key} is {shown(of)}; expected a list of {PART_KEYS[key]} numbers")
+            if parts and len(lists[i]) == 51 and 133 in layouts:
+                of_parts = (parts.get(key, [0] * n) for key, n in PART_KEYS.items())
+                lists[i] = list(chain(_listed(lists[i]), *of_parts))
             n = len(lists[i])
             if n % 3 or n // 3 not in layouts:
                 counts = ", ".join(map(str, layouts))

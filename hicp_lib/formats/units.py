@@ -20,13 +20,15 @@ _CERTAIN = 10  # number of people, without a contradiction
 _MUCH = 0.25  # of a box's side: nearer to the image's corner, both readings are similar
 
 
-def count_fractions(points_px: np.ndarray) -> tuple[int, int, float]:
-    """Count for `refuse_fractions`.
+def count_fractions(points_px: np.ndarray, n_before: int = 0) -> tuple[int, int, float, int]:
+    """Count for `fractions_note`.
 
     Parameters
     ----------
     points_px : array, shape (n, k, 2)
         Of people; NaN, and 0, 0, where missing.
+    n_before : int, optional
+        How many people of the file were counted before.
 
     Returns
     -------
@@ -36,28 +38,36 @@ def count_fractions(points_px: np.ndarray) -> tuple[int, int, float]:
         Those of them all of whose coordinates may be fractions of the image, from 0 or -1 to 1.
     least : float
         The least coordinate of these.
+    first : int
+        The first of them in the file, from 0.
     """
     given = np.isfinite(points_px).all(axis=-1) & (points_px != 0).any(axis=-1)
     small = ((points_px <= _FRACTION) & (points_px >= -_FRACTION)).all(axis=-1)
     people = given.sum(axis=-1) >= min(_LEAST_POINTS, points_px.shape[-2])
     fractions = people & (small | ~given).all(axis=-1)
     least = points_px[fractions][given[fractions]].min(initial=0.0)
-    return int(people.sum()), int(fractions.sum()), float(least)
+    first = n_before + int(np.append(fractions, True).argmax())
+    return int(people.sum()), int(fractions.sum()), float(least), first
 
 
-def refuse_fractions(
-    path: Path | str, counts: Sequence[tuple[int, int, float]], what: str = "keypoints"
-) -> None:
-    """Refuse coordinates that are fractions of the image.
+def fractions_note(
+    path: Path | str, counts: Sequence[tuple[int, int, float, int]], what: str = "keypoints"
+) -> str:
+    """Refuse coordinates that are fractions of the image, and note where some people's may be.
 
     Parameters
     ----------
     path : Path or str
         The file or folder, for the message.
-    counts : sequence of (int, int, float)
+    counts : sequence of (int, int, float, int)
         `count_fractions` of all people in it, or of parts of them.
     what : str, optional
         What they are, for the message.
+
+    Returns
+    -------
+    str
+        Empty if nobody's may be.
 
     Raises
     ------
@@ -70,6 +80,9 @@ def refuse_fractions(
         span, first = ("[-1, 1]", "add 1, halve and ") if signed else ("[0, 1]", "")
         expected = f"expected pixels, {first}multiply by the image's width and height"
         raise InputError(f"{path}: {what}: all coordinates lie in {span}; {expected}")
+    row = next((of[3] for of in counts if of[1]), 0)
+    some = f"{what} of {n_fractions} of {n_people} people, first of entry {row} (from 0), lie in [-1, 1]"
+    return f"{some}; they are read as pixels: are they fractions of the image?" if n_fractions else ""
 
 
 def corners_note(

@@ -15,7 +15,7 @@ from hicp_lib.formats.importers.people import People
 from hicp_lib.formats.importers.scores import score_scale
 from hicp_lib.formats.json_validation import PART_KEYS
 from hicp_lib.formats.layouts import layouts_of
-from hicp_lib.formats.units import count_fractions, refuse_fractions
+from hicp_lib.formats.units import count_fractions, fractions_note
 from hicp_lib.inspection.facts import Facts, about_people, about_times, tables
 
 MOST_HEADERS = 2000  # number of images of a folder that are examined
@@ -38,7 +38,7 @@ def describe_predictions(path: Path, tool: str, origin: str = "") -> Facts:
     Facts
     """
     people = READERS[tool](path)
-    refuse_fractions(path, [count_fractions(people.keypoints_px)])
+    note = fractions_note(path, [count_fractions(people.keypoints_px)])
     layouts = ", ".join(f"{name} {n}" for name, n in people.conventions.items())
     scores, needs = _scores(tool, people)
     says = {
@@ -50,7 +50,7 @@ def describe_predictions(path: Path, tool: str, origin: str = "") -> Facts:
     times_s = sorted({extra["time_s"] for extra in people.extras if "time_s" in extra})
     if times_s:
         says["times"] = about_times(np.array(times_s), "of the video; frames with people")
-    return Facts(says, needs=needs)
+    return Facts(says, [note] * bool(note), needs)
 
 
 def _scores(tool: str, people: People) -> tuple[str, dict[str, str]]:
@@ -101,7 +101,7 @@ def describe_annotations(path: Path, images_dir: Path | None = None) -> Facts:
 
 
 def _layout(rows: list[dict], names: Sequence[str]) -> str:
-    n = {133 if all(key in row for key in PART_KEYS) else len(row.get("keypoints", ())) // 3 for row in rows}
+    n = {133 if any(map(row.get, PART_KEYS)) else len(row.get("keypoints", ())) // 3 for row in rows}
     if not names:
         return f"{', '.join(map(str, sorted(n)))} keypoints by their number: the file has no names"
     indices = layouts_of("", names)[0][len(names)]

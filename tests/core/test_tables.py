@@ -7,13 +7,14 @@ import pytest
 from pyarrow import parquet
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.tables import read_table
+from hicp_lib.core.tables import read_table, read_table_in_parts
 
 CSV = {
     "a column twice": ("a,b,a\n1,2,3\n", "column 'a' 2 times"),
     "a column missing": ("a,c\n1,2\n", "no column 'b'"),
     "very many columns": ("a,b" + ",x" * 10**6 + "\n1,2" + ",1" * 10**6 + "\n", "1000002 columns"),
     "rows that differ": ("a,b\n1,2\n1,2,3\n", "cannot be read as a table"),
+    "a field without a title": ("a,b\n0,1,2\n1,3,4\n", "cannot be read as a table .*[Ll]ength of header"),
     "nothing": ("", "cannot be read as a table"),
     "no text": (b"\xff\xfe\x00a,b".decode("latin-1"), "cannot be read as a table|no column"),
 }
@@ -50,6 +51,18 @@ def test_parquet_is_read_where_its_columns_are_there_once(tmp_path):
     path.write_bytes(path.read_bytes()[:-20])
     with pytest.raises(InputError, match="t.parquet: cannot be read as a table"):
         read_table(path, ["a", "b"])
+
+
+def test_columns_that_pandas_has_as_its_index_are_columns(tmp_path):
+    pd.DataFrame({"a": [3, 1, 7], "b": [4, 2, 0]}).set_index("a").to_parquet(tmp_path / "t.parquet")
+    assert read_table(tmp_path / "t.parquet", ["a", "b"])["a"].tolist() == [3, 1, 7]
+
+
+@pytest.mark.parametrize("n_rows", [None, 1, 2])
+def test_a_comma_behind_each_row_moves_no_column(tmp_path, n_rows):
+    (tmp_path / "t.csv").write_text("a,b\n1,2,\n3,4,\n")
+    parts = read_table_in_parts(tmp_path / "t.csv", ["a", "b"], n_rows)
+    assert pd.concat(parts).to_dict("list") == {"a": [1, 3], "b": [2, 4]}
 
 
 def test_a_small_file_that_stands_for_very_many_cells_is_not_unpacked(tmp_path, monkeypatch):

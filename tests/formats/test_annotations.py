@@ -9,13 +9,15 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
+from hicp_lib.cli import main as cli
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.keypoints import INDEX, TO_HALPE
+from hicp_lib.core.keypoints import INDEX, NAMES, TO_HALPE
 from hicp_lib.datasets.subsets import SUBSETS, crop_annotations, plan
 from hicp_lib.evaluation.ap.evaluate import evaluate
 from hicp_lib.formats.annotations import Annotations, read_annotations, write_annotations
 from hicp_lib.formats.detections import read_detections, write_detections
+from hicp_lib.formats.importers.importing import import_predictions, summary_lines
 
 
 def keypoints(n: int, x: float = 100.0, v: float = 2) -> list[float]:
@@ -99,6 +101,19 @@ def test_wholebody_files_spread_over_five_keys(write):
     joined = read_annotations(write(file(person(1, n=133))))
     read = read_annotations(write(file(spread)))
     assert np.array_equal(read.keypoints_px, joined.keypoints_px, equal_nan=True)
+    # Keys that are absent, null or empty are of parts nobody labelled.
+    for key, rest in (("foot_kpts", {"face_kpts": None, "lefthand_kpts": []}), ("face_kpts", {})):
+        partial = {k: of for k, of in (spread | rest).items() if k != key}
+        some = read_annotations(write(file(partial, person(2, n=17))))
+        gone = [k for k in cuts if not partial.get(k)]
+        zeros = [0 if any(cuts[k][0] <= i < cuts[k][1] for k in gone) else x for i, x in enumerate(whole)]
+        same = read_annotations(write(file(person(1, keypoints=zeros), person(2, n=17))))
+        assert np.array_equal(some.keypoints_px, same.keypoints_px, equal_nan=True)
+        assert (some.visibility[0, INDEX["right_hand_root"]] > 0) and (some.visibility[1] > 0).sum() == 17
+    # Where the body's keypoints are not COCO's, it is told that the others are not read.
+    named = file(person(1, n=16, lefthand_kpts=whole[:63]), person(2, n=16))
+    named["categories"][0]["keypoints"] = [*NAMES[:15], "neck"]
+    assert "of 1 people left out" in read_annotations(write(named)).notes["parts"]
     # The left small toe is WholeBody's 18, Halpe's 22.
     assert read.keypoints_px[0, INDEX["left_small_toe"]].tolist() == [118.0, 96.0]
 
@@ -125,6 +140,25 @@ def test_detections_are_read_in_the_order_of_the_file(write):
     only_one = read_detections(write(lines[:1]), truth)
     assert list(only_one) == [7, 9] and len(only_one[7]) == 0 and len(only_one[9]) == 1
     assert list(read_detections(write(lines[:1]))) == [9]
+
+
+def test_people_in_fractions_among_others_are_told(tmp_path, capsys):
+    truth, found = [person(i, area=41_000) for i in range(5)], [result() for _ in range(5)]
+    truth[3] |= {"bbox": [0.1, 0.1, 0.5, 0.6], "keypoints": [0.5, 0.6, 2] * 136}
+    found[1] |= {"keypoints": [0.5, 0.6, 0.9] * 136}
+    a, d = tmp_path / "a.json", tmp_path / "d.json"
+    a.write_text(json.dumps(file(*truth)))
+    d.write_text(json.dumps(found))
+    some = "of 1 of 5 people, first of entry {} (from 0), lie in [-1, 1]"
+    given = ["--annotations", str(a), "--detections", str(d)]
+    assert cli.run(["evaluate", *given, "--group", "body"]) == 0
+    told = capsys.readouterr().err
+    assert f"{d}: keypoints {some.format(1)}; they are read as pixels" in told
+    assert f"{a}: keypoints {some.format(3)}" in told and f"; boxes {some.format(3)}" in told
+    imported = import_predictions("coco", d, read_annotations(a))
+    assert f"keypoints {some.format(1)}" in summary_lines(imported.summary)[-1]
+    assert cli.run(["inspect", str(d)]) == 0
+    assert "note: keypoints of 1 of 5 people" in capsys.readouterr().out
 
 
 def test_an_empty_list_of_detections_is_nobody_found(write):
@@ -187,6 +221,10 @@ MALFORMED_ANNOTATIONS = {
     "true for 1": (file(person(1), changed(person(2), 2, True)), r"\(id 2\): .*\(nose v\) is true"),
     "huge": (file(changed(person(1), 0, 10**400)), r"\(nose x\) is too large a number"),
     "NaN elsewhere": (file(person(1, note=[math.nan])), "a further key holds NaN"),
+    "source a list": (file(person(1, source_image_id=[1])), "source_image_id is a list of 1; expected"),
+    "source null": (file(person(1, source_image_id=None)), "source_image_id is null; expected"),
+    "too short a hand": (file(person(1, n=17, lefthand_kpts=[1, 2, 2])), "lefthand_kpts is a list of 3"),
+    "no list of a face": (file(person(1, n=17, face_kpts=7)), "face_kpts is 7; expected a list of 204"),
     "image id twice": (file() | {"images": 2 * file()["images"][:1]}, "id is used before, by images"),
     "image no size": (file() | {"images": [{"id": 1, "file_name": "a"}]}, r"\(id 1\): has no 'width'"),
 }  # fmt: skip

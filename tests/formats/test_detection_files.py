@@ -10,6 +10,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.formats import detection_files
 from hicp_lib.formats.detection_files import SUFFIXES, open_detections, read_rows
+from hicp_lib.formats.detections import write_detections
 
 
 def made(n: int, seed: int) -> Detections:
@@ -69,6 +70,15 @@ def test_a_table_is_tidy_and_its_columns_say_their_units(tmp_path):
     ]  # fmt: skip
     assert len(table) == 6 * 25
     assert (table.loc[table["image_id"] == 12, "person"].unique() == [0, 1, 2]).all()
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES[1:])
+def test_what_is_known_of_some_people_only_is_told_when_it_becomes_a_table(tmp_path, suffix, monkeypatch):
+    monkeypatch.setattr(detection_files, "_PEOPLE_AT_ONCE", 1)
+    raw = "raw_keypoint_scores"
+    for first, other in (({"time_s": 0.5}, {}), ({raw: [0.5] * 136}, {raw: [0.5]})):
+        with pytest.raises(InputError, match=f"d{suffix}: people's file_name, .* no columns of a table"):
+            write_detections(tmp_path / f"d{suffix}", IMAGES, {7: [first] * 2, 3: [other], 12: [first] * 3})
 
 
 def test_nothing_is_left_of_a_file_that_was_cut_off(tmp_path):

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from pycocotools.coco import COCO
 
+from hicp_lib.cli import main as cli
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES, TO_HALPE
 from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations
-from hicp_lib.formats.detections import read_detections
+from hicp_lib.formats.detections import read_detections, write_detections
 from hicp_lib.formats.exporters import LAYOUTS, export_detections
 
 
@@ -81,6 +82,20 @@ def test_our_own_reader_takes_the_data_set_for_annotations(tmp_path, images, fou
     assert np.array_equal(again.keypoints_px[:2], found[7].keypoints_px, equal_nan=True)
 
 
+@pytest.mark.parametrize("suffix", [".json", ".csv", ".parquet"])
+def test_results_keep_the_names_of_their_images(tmp_path, images, found, suffix):
+    names, out = {7: "11.png", 9: "9.png", 11: "7.png"}, str(tmp_path / "e.json")
+    facts = {i: [{"file_name": names[i], "frame": i, "time_s": i / 4}] * len(of) for i, of in found.items()}
+    write_detections(tmp_path / f"d{suffix}", found, facts)
+    given = ["--detections", str(tmp_path / f"d{suffix}"), "--format", "coco"]
+    assert cli.run(["export", *given, "--out", out]) == 0
+    rows = json.loads((tmp_path / "e.json").read_text())
+    assert [(row["file_name"], row["frame"], row["time_s"]) for row in rows] == [
+        ("11.png", 7, 1.75), ("11.png", 7, 1.75), ("7.png", 11, 2.75),
+    ]  # fmt: skip
+    assert [len(of) for of in read_detections(tmp_path / "e.json", images).values()] == [1, 0, 2]
+
+
 def test_nobody_is_an_empty_list(tmp_path):
     assert export_detections("coco", {7: Detections.none()}, tmp_path / "d.json") == 0
     assert json.loads((tmp_path / "d.json").read_text()) == []
@@ -96,6 +111,8 @@ def test_what_cannot_be_exported(tmp_path, images, found):
         export_detections("fiftyone", found, out)
     with pytest.raises(InputError, match="image 8: not among"):
         export_detections("fiftyone", {8: found[9]}, out, images)
+    with pytest.raises(InputError, match="d.csv: ends in '.csv'; expected .json"):
+        export_detections("coco", found, tmp_path / "d.csv")
     assert not out.exists()
 
 

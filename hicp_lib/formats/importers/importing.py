@@ -19,13 +19,14 @@ from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.folders import listed
 from hicp_lib.core.images import inside
 from hicp_lib.formats.annotations import Annotations, rows_by_image
+from hicp_lib.formats.detection_files import RAW_SCORES
 from hicp_lib.formats.importers.matching import ImageMatcher
 from hicp_lib.formats.importers.mmpose import read_mmpose
 from hicp_lib.formats.importers.openpose import read_openpose, refuse_other_size
 from hicp_lib.formats.importers.people import People
 from hicp_lib.formats.importers.results import ALPHAPOSE, COCO, DETECTRON2, read_results
 from hicp_lib.formats.importers.scores import score_scale
-from hicp_lib.formats.units import count_fractions, refuse_fractions
+from hicp_lib.formats.units import count_fractions, fractions_note
 
 _LEAST_IMAGES = 5  # needed to decide whether coordinates are of another size
 _OFF, _ALIKE = np.log(1.25), 0.1  # logarithms of ratios: another size, and equal in both directions
@@ -57,7 +58,8 @@ class Imported:
         out; `n_people` imported; `conventions`, people per keypoint convention, unmatched ones included;
         `score_range`, lowest, median and highest keypoint score as the tool wrote them; `score_scale`, what
         they were divided by, and `n_cut`, how many were then clipped to 1; `n_keypoints` given, and
-        `n_outside` of their image; `n_passed_over`, files in JSON that are not named as the others.
+        `n_outside` of their image; `n_passed_over`, files in JSON that are not named as the others; `notes`, what
+        is doubtful.
     """
 
     detections: dict[int, Detections]
@@ -95,7 +97,7 @@ def import_predictions(
     if scale is not None and not 0 < scale < np.inf:
         raise InputError(f"--score-scale is {scale:g}; expected a positive number")
     people = READERS[format](Path(path))
-    refuse_fractions(people.path, [count_fractions(people.keypoints_px)])
+    note = fractions_note(people.path, [count_fractions(people.keypoints_px)])
     matched = ImageMatcher(people.path, people.named_by, annotations.images).match(people.sources)
     scale = score_scale(format, people) if scale is None else scale
     rows = np.flatnonzero([matched[s] is not None for s in people.source_of])
@@ -106,7 +108,8 @@ def import_predictions(
     image_ids = np.array([matched[s] for s in people.source_of[rows]], dtype=np.int64)
     _refuse_other_scale(people.path, people.keypoints_px[rows], image_ids, annotations)
     detections, extras = _by_image(people, matched, annotations, scale)
-    return Imported(detections, extras, _summary(format, people, matched, annotations, rows, sizes, scale))
+    summary = _summary(format, people, matched, annotations, rows, sizes, scale)
+    return Imported(detections, extras, summary | {"notes": [note] * bool(note)})
 
 
 def _refuse_other_scale(
@@ -137,7 +140,7 @@ def _by_image(
         if (image := matched[source]) is not None:
             points = people.keypoints_px[rows]
             detections[image] = Detections(points, scores[rows], people.person_scores[rows])
-            extras[image] = [people.extras[i] | {"raw_keypoint_scores": raw[i]} for i in rows.tolist()]
+            extras[image] = [people.extras[i] | {RAW_SCORES: raw[i]} for i in rows.tolist()]
     return detections, extras
 
 
@@ -184,4 +187,5 @@ def summary_lines(summary: dict[str, Any]) -> list[str]:
         "keypoints outside their image: {n_outside} of {n_keypoints}".format(**summary),
         f"not annotated and left out: {len(unmatched)} images{named if unmatched else ''}",
         *([f"passed over: {rest} files in JSON, not named as the others"] if rest else []),
+        *summary["notes"],
     ]

@@ -27,11 +27,9 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.formats.annotations import PERSON_CATEGORY
-from hicp_lib.formats.detection_files import read_rows
+from hicp_lib.formats.detection_files import KNOWN_KEYS, read_rows
 from hicp_lib.formats.importers.people import People, split
-from hicp_lib.formats.json_validation import PART_KEYS, Rows, shown
-
-_KNOWN_KEYS = {"image_id", "file_name", "category_id", "keypoints", "score", *PART_KEYS}
+from hicp_lib.formats.json_validation import Rows, shown
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ def read_results(path: Path, dialect: Dialect) -> People:
     keypoints, scores = split(triples, given)
     return People(
         path, dialect.named_by, sources, source_of, keypoints - dialect.offset_px, scores,
-        rows.numbers("score"), conventions, rows.extras(_KNOWN_KEYS),
+        rows.numbers("score"), conventions, rows.extras(KNOWN_KEYS | {"file_name"}),
     )  # fmt: skip
 
 

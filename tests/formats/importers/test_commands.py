@@ -60,3 +60,14 @@ def test_mistakes(capsys, tmp_path):
     run(capsys, *importing("coco", out))
     export = ["export", "--detections", out, "--out", tmp_path / "e.json", "--format", "fiftyone"]
     assert "needs the annotations" in mistake(capsys, *export)
+
+
+def test_an_import_tells_what_is_doubtful_in_the_annotations(capsys, tmp_path):
+    annotations = json.loads((EXAMPLES / "annotations.json").read_text())
+    annotations["categories"].append({"id": 2, "name": "dog"})
+    annotations["annotations"].append({"id": 99, "category_id": 2})
+    (tmp_path / "a.json").write_text(json.dumps(annotations))
+    arguments = importing("coco", tmp_path / "d.json")
+    arguments[arguments.index("--annotations") + 1] = tmp_path / "a.json"
+    assert cli.run([str(argument) for argument in arguments]) == 0
+    assert "a.json: 1 objects of other categories left out" in capsys.readouterr().err

@@ -266,5 +266,5 @@ def test_mmpose_without_boxes_ranks_by_keypoints(tmp_path, images):
 def test_of_images_that_are_not_annotated_three_are_named(names, told):
     counts = "images with_people without_people not_mentioned people cut keypoints outside passed_over"
     summary = {f"n_{count}": 0 for count in counts.split()} | {"format": "coco", "unmatched": list(names)}
-    summary |= {"conventions": {}, "score_range": [0.0, 0.0, 0.0], "score_scale": 1.0}
+    summary |= {"conventions": {}, "score_range": [0.0, 0.0, 0.0], "score_scale": 1.0, "notes": []}
     assert summary_lines(summary)[-1] == f"not annotated and left out: {len(names)} images ({told})"
