@@ -58,8 +58,8 @@ class Imported:
         out; `n_people` imported; `conventions`, people per keypoint convention, unmatched ones included;
         `score_range`, lowest, median and highest keypoint score as the tool wrote them; `score_scale`, what
         they were divided by, and `n_cut`, how many were then clipped to 1; `n_keypoints` given, and
-        `n_outside` of their image; `n_passed_over`, files in JSON that are not named as the others; `notes`, what
-        is doubtful.
+        `n_outside` of their image; `n_passed_over`, files in JSON that are not named as the others; `notes`,
+        what is doubtful.
     """
 
     detections: dict[int, Detections]
