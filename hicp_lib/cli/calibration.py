@@ -27,10 +27,9 @@ def calibration_fit(annotations: Path, detections: Path, detector: str, out: Pat
     table, counts = fit_calibrations(people, read_detections(detections, people), detector)
     tell_notes(annotations, people.notes)
     write_calibrations(out, table)
-    told = (
-        f"fitted to {n} keypoints" if n else "not fitted: the annotations label none" for n in counts.values()
-    )
-    click.echo(f"{out}: " + ", ".join(f"{group} {of}" for group, of in zip(counts, told, strict=True)))
+    none = "not fitted: the annotations label none"
+    told = (f"{group} {f'fitted to {n} keypoints' if n else none}" for group, n in counts.items())
+    click.echo(f"{out}: {', '.join(told)}")
 
 
 @calibration.command("apply")

@@ -43,8 +43,8 @@ def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "", what: str =
     return sorted((n for n in names if n[0] != "." and n.lower().endswith(suffixes)), key=natural_order)
 
 
-def passed_over(folder: str | Path, suffixes: tuple[str, ...]) -> str:
-    """How many things in a folder `listed` leaves out by their endings, and which those are; empty for none.
+def listed_and_others(folder: str | Path, suffixes: tuple[str, ...]) -> tuple[list[str], str]:
+    """As `listed`, and words on how many others there are, with which endings; empty if there are none.
 
     Examples
     --------
@@ -53,14 +53,16 @@ def passed_over(folder: str | Path, suffixes: tuple[str, ...]) -> str:
     ...     for name in ("a.png", "b.gif", "c.GIF"):
     ...         Path(folder, name).touch()
     ...     Path(folder, "sub").mkdir()
-    ...     passed_over(folder, (".png",)), passed_over(folder, (".png", ".gif", "sub"))
-    ('3 others (.gif, folders) passed over', '')
+    ...     listed_and_others(folder, (".png",)), listed_and_others(folder, (".png", ".gif", "sub"))[1]
+    ((['a.png'], '3 others (.gif, folders) passed over'), '')
     """
-    others = [Path(folder, name) for name in listed(folder) if not name.lower().endswith(suffixes)]
+    everything = listed(folder)
+    names = [name for name in everything if name.lower().endswith(suffixes)]
+    others = [Path(folder, name) for name in everything if not name.lower().endswith(suffixes)]
     kinds = ["folders" if path.is_dir() else path.suffix.lower() or "no ending" for path in others]
     more = ", ..." * (len(set(kinds)) > _MOST_ENDINGS)
     shown = ", ".join([*dict.fromkeys(kinds)][:_MOST_ENDINGS])
-    return f"{len(others)} others ({shown}{more}) passed over" if others else ""
+    return names, f"{len(others)} others ({shown}{more}) passed over" if others else ""
 
 
 def kept_beside(folder: Path, name: str, **kinds: type) -> dict[str, Any]:

@@ -78,8 +78,7 @@ class ImageInfo:
         -------
         str
         """
-        *header_px, flag = (*size_px, 1) if size_px else image_header(folder / self.file_name)
-        width_px, height_px = header_px
+        width_px, height_px, flag = (*size_px, 1) if size_px else image_header(folder / self.file_name)
         if not width_px or (width_px, height_px) == (self.width_px, self.height_px):
             return ""
         as_stored = f" as stored (rotation flag {flag})" if flag > 1 else ""

@@ -10,7 +10,7 @@ from PIL import Image
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, read_json
-from hicp_lib.core.folders import listed, passed_over
+from hicp_lib.core.folders import listed_and_others
 from hicp_lib.core.images import image_header, refuse_too_large
 from hicp_lib.core.video import open_video
 from hicp_lib.detectors.mediapipe.bundles import BUNDLES
@@ -50,7 +50,8 @@ def describe_video(path: Path) -> Facts:
 
 def describe_images(folder: Path) -> Facts:
     """Say what images a folder holds; pixels are not read."""
-    paths = [folder / name for name in listed(folder, IMAGE_SUFFIXES)]
+    names, rest = listed_and_others(folder, IMAGE_SUFFIXES)
+    paths = [folder / name for name in names]
     headers = [image_header(path) if path.is_file() else (0, 0, 1) for path in paths[:MOST_HEADERS]]
     sizes = Counter(f"{width} x {height}" for width, height, _ in headers if width)
     shown = ", ".join(f"{size} ({n})" for size, n in sizes.most_common(3)) + ", ..." * (len(sizes) > 3)
@@ -60,7 +61,6 @@ def describe_images(folder: Path) -> Facts:
         "cannot be read": sum(not width for width, *_ in headers),
         "were not looked into": len(paths) - len(headers),
     }  # fmt: skip
-    rest = passed_over(folder, IMAGE_SUFFIXES)
     notes = [*(f"{n} images {what}" for what, n in counts.items() if n), *[rest] * bool(rest)]
     return Facts({"images": f"{len(paths)}; pixels: {shown or 'none'}"}, notes)
 

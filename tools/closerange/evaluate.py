@@ -91,10 +91,10 @@ def ablations(metrics: pd.DataFrame, pairs: pd.DataFrame, first: str) -> pd.Data
     changes = pairs[(pairs["metric"] == "AP") & (pairs["other"] == pairs["detector"].map(bases))]
     changes = changes.rename(columns={"value": "change", "low": "change_low", "high": "change_high"})
     rows = rows.merge(changes[[*keys, "change", "change_low", "change_high"]], "left", keys)
-    variants = rows["detector"].map(shown)
-    rows.insert(0, "variant", variants)
-    rows.insert(7, "less", rows["detector"].map(bases).map(shown).mask(rows["change"].isna()))
-    return rows.drop(columns="detector")
+    less = rows["detector"].map(bases).map(shown).mask(rows["change"].isna())
+    rows = rows.assign(variant=rows["detector"].map(shown), less=less)
+    bounds = ["value", "low", "high", "less", "change", "change_low", "change_high"]
+    return rows[["variant", "subset", "group", *bounds]]
 
 
 def main() -> None:

@@ -128,6 +128,21 @@ def start(options: argparse.Namespace) -> tuple[CloseRange, dict]:
     return network, {"network": network, "average": average, "optimizer": optimizer, "schedule": schedule}
 
 
+def resume(out: Path, parts: dict, numbers: dict) -> tuple[int, list[dict]]:
+    """Steps done and the curve of a stopped training, whose state is put into the parts; else 0 and none."""
+    configuration, done, curve = out / "configuration.json", 0, []
+    if (out / "state.pt").exists():
+        before = json.loads(configuration.read_text())
+        if others := [name for name in numbers | before if numbers.get(name) != before.get(name)]:
+            sys.exit(f"{out} was begun with other values of {', '.join(others)}; give another folder")
+        state = torch.load(out / "state.pt", weights_only=True)
+        for name, part in parts.items():
+            part.load_state_dict(state[name])
+        done, curve = state["step"], pd.read_csv(out / "curve.csv").to_dict("records")
+    configuration.write_text(json.dumps(numbers, indent=1) + "\n")
+    return done, curve
+
+
 def train(options: argparse.Namespace) -> None:
     torch.manual_seed(options.seed)
     torch.set_num_threads(options.threads)
@@ -145,16 +160,7 @@ def train(options: argparse.Namespace) -> None:
         "n_training": len(training), "n_checking": len(checking), "squares_sha256": squares_sha256(squares),
         "held_back": sorted(set(truth["body"][checking])), "torch": torch.__version__,
     }  # fmt: skip
-    configuration, done, curve = out / "configuration.json", 0, []
-    if (out / "state.pt").exists():
-        before = json.loads(configuration.read_text())
-        if others := [name for name in numbers | before if numbers.get(name) != before.get(name)]:
-            sys.exit(f"{out} was begun with other values of {', '.join(others)}; give another folder")
-        state = torch.load(out / "state.pt", weights_only=True)
-        for name, part in parts.items():
-            part.load_state_dict(state[name])
-        done, curve = state["step"], pd.read_csv(out / "curve.csv").to_dict("records")
-    configuration.write_text(json.dumps(numbers, indent=1) + "\n")
+    done, curve = resume(out, parts, numbers)
     sums, began = [], time.perf_counter()
     for step, rows in enumerate(batches(training, BATCH, options.seed, done, options.steps), done + 1):
         network.train()

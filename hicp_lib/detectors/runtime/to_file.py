@@ -12,7 +12,7 @@ import numpy as np
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import atomic_path
-from hicp_lib.core.folders import listed, passed_over
+from hicp_lib.core.folders import listed_and_others
 from hicp_lib.core.images import rotation_note
 from hicp_lib.core.video import SUFFIXES as VIDEO_SUFFIXES
 from hicp_lib.core.video import open_video
@@ -69,7 +69,7 @@ def open_pictures(source: Path) -> Pictures:
         return Pictures(source, images, n_frames or None)
     if not source.is_dir():
         raise InputError(f"{source}: is not a folder; give the folder that holds the images, or a video")
-    names, rest = listed(source, IMAGE_SUFFIXES), passed_over(source, IMAGE_SUFFIXES)
+    names, rest = listed_and_others(source, IMAGE_SUFFIXES)
     if not names:
         what = f"holds no images{rest and f', {rest}'}"
         raise InputError(f"{source}: {what}; expected files such as 000001.jpg or photo.png")
